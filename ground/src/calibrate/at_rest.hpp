@@ -1,6 +1,7 @@
 #pragma once
-/// Noise of what changes smoothly while the body is at rest.
+/// Noise of what changes smoothly while the body turns evenly.
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -47,13 +48,25 @@ class AtRest {
     }
     step_s_ = median_of(steps_s);
     const auto rates = Eigen::Matrix3Xd::Map(rates_rad_s_.data(), 3, static_cast<Eigen::Index>(t_s_.size()));
-    const Eigen::Vector3d usual_rad_s = medians_of(rates);
-    farthest_s_ = std::min(kFarthest_s, kFarthestTurn_rad / usual_rad_s.norm());
-    const double rest_rad_s = std::max(kSlowest_rad_s, kPartOfUsual * usual_rad_s.norm());
+    const Eigen::ArrayXd sizes_rad_s = rates.colwise().norm();
+    std::vector<double> sorted_rad_s(sizes_rad_s.begin(), sizes_rad_s.end());
+    const double usual_rad_s = median_of(sorted_rad_s);
+    farthest_s_ = std::min(kFarthest_s, kFarthestTurn_rad / usual_rad_s);
+    const double rest_rad_s = std::max(kSlowest_rad_s, kPartOfUsual * usual_rad_s);
     in_motion_ = {0};
-    for (Eigen::Index i = 0; i < rates.cols(); ++i) {
-      const bool rests = (rates.col(i) - usual_rad_s).norm() < rest_rad_s;
-      in_motion_.push_back(in_motion_.back() + (rests ? 0 : 1));
+    Eigen::Index begin = 0;
+    while (begin < rates.cols()) {
+      const double until_s = t_s_[static_cast<std::size_t>(begin)] + kStretch_s;
+      Eigen::Index end = begin;
+      while (end < rates.cols() && t_s_[static_cast<std::size_t>(end)] < until_s) {
+        ++end;
+      }
+      end = std::max(end, begin + 1);
+      const Eigen::Vector3d its_rad_s = medians_of(rates.middleCols(begin, end - begin));
+      for (; begin < end; ++begin) {
+        const bool rests = (rates.col(begin) - its_rad_s).norm() < rest_rad_s;
+        in_motion_.push_back(in_motion_.back() + (rests ? 0 : 1));
+      }
     }
   }
 
@@ -65,7 +78,7 @@ class AtRest {
   /// Calls take(Five) for all five times `lag` steps apart, or for enough of them.
   template <class Take>
   void for_each_five(std::size_t lag, const Take& take) const {
-    constexpr std::size_t kEnough = 10000;
+    constexpr std::size_t kEnough = 5000;
     constexpr double kEven = 0.25;  // steps
     const double lag_s = static_cast<double>(lag) * step_s_;
     if (in_motion_.empty() || lag_s > farthest_s_) {
@@ -94,6 +107,7 @@ class AtRest {
   static constexpr double kFarthestTurn_rad = 0.2;
   static constexpr double kSlowest_rad_s = 0.01 * kDegree;
   static constexpr double kPartOfUsual = 0.2;
+  static constexpr double kStretch_s = 600;  ///< of which a rate is the usual one
 
   std::vector<double> t_s_;
   std::vector<double> rates_rad_s_;     ///< of the body, three for each time
@@ -101,5 +115,18 @@ class AtRest {
   double step_s_ = 0;
   double farthest_s_ = 0;
 };
+
+/// What is left of fourth differences, of unit 1-sigma but for outliers, when the alignments are taken for those that
+/// make the least of them: a body that wobbles shows them. `by_alignments`: how rad of each change the differences.
+[[nodiscard]] inline Eigen::VectorXd without_alignments(const Eigen::VectorXd& differences,
+                                                        const Eigen::MatrixXd& by_alignments) {
+  constexpr double kAlignment_rad = 0.02;
+  constexpr double kOutlier = 6;
+  const Eigen::VectorXd used = (differences.array().abs() < kOutlier).cast<double>();
+  Eigen::MatrixXd information = by_alignments.transpose() * used.asDiagonal() * by_alignments;
+  information.diagonal().array() += 1 / (kAlignment_rad * kAlignment_rad);
+  const Eigen::VectorXd by_all = by_alignments.transpose() * used.cwiseProduct(differences);
+  return differences - by_alignments * information.ldlt().solve(by_all);
+}
 
 }  // namespace trihedron::ground

@@ -22,10 +22,26 @@
 namespace trihedron::ground {
 namespace {
 
+/// Rotation, c axes, of the trihedron of two momenta by rotations of their readings, rad.
+using ByAlignments = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
+ByAlignments by_alignments(const Eigen::Matrix3d& C_c_g, double cosine) {
+  const Eigen::Vector3d across = C_c_g.col(0);
+  const Eigen::Vector3d first = C_c_g.col(1);  // momentum
+  const Eigen::Vector3d beside = C_c_g.col(2);
+  const double cotangent = cosine / std::sqrt(1 - cosine * cosine);
+  ByAlignments in_g = ByAlignments::Zero();
+  in_g.block<1, 3>(0, 0) = across.transpose();
+  in_g.block<1, 3>(1, 0) = cotangent * beside.transpose();
+  in_g.block<1, 3>(1, 3) = (first - cotangent * beside).transpose();
+  in_g.block<1, 3>(2, 0) = beside.transpose();
+  return C_c_g * in_g;
+}
+
 /// A fix beside the trihedron g of the first two momenta.
 struct FixByGyros {
   Eigen::Matrix3d C_in_c;  ///< by the fix
   Eigen::Matrix3d C_c_g;   ///< by the readings
+  ByAlignments by_alignments;
 };
 
 /// About c x, y, z, by errors so far apart, from so many differences.
@@ -45,7 +61,9 @@ class ErrorsAtRest {
     for (std::size_t i = 0; i < std::min(fixes.size(), kMostFixes); ++i) {
       const std::optional<FittedDirections> fitted = readings.at(fixes.t[i], from);
       if (fitted && nearly_unit(fixes.q_in_c[i].norm())) {
-        fixes_.push_back({fixes.q_in_c[i].normalized().toRotationMatrix(), triad(fitted->h_b[0], fitted->h_b[1])});
+        const Eigen::Matrix3d C_c_g = triad(fitted->h_b[0], fitted->h_b[1]);
+        fixes_.push_back({fixes.q_in_c[i].normalized().toRotationMatrix(), C_c_g,
+                          by_alignments(C_c_g, fitted->h_b[0].dot(fitted->h_b[1]))});
         at_rest_.add(to_seconds(fixes.t[i] - fixes.t.front()), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
       }
     }
@@ -59,23 +77,40 @@ class ErrorsAtRest {
   /// Of the errors of fixes so many steps apart: as far as these errors are alike it is less than theirs. Nothing where
   /// there are too few.
   [[nodiscard]] std::optional<Variance> variance(std::size_t lag) const {
-    std::array<std::vector<double>, 3> sizes;
+    std::vector<double> differences_rad;  // three each
+    std::vector<double> by_alignments;    // 3 × 6 each, row by row
     at_rest_.for_each_five(lag, [&](const AtRest::Five& five) {
       const std::array<Eigen::Array3d, 5> off_rad = off_from_first(five);
       if (is_near(five, off_rad.back())) {
         const Eigen::Array3d difference = AtRest::fourth_difference(off_rad);
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          sizes[axis].push_back(std::abs(difference(static_cast<Eigen::Index>(axis))));
-        }
+        const ByAlignments rows = AtRest::fourth_difference(by_alignments_from_first(five));
+        differences_rad.insert(differences_rad.end(), difference.begin(), difference.end());
+        by_alignments.insert(by_alignments.end(), rows.data(), rows.data() + rows.size());
       }
     });
-    if (sizes[0].size() < AtRest::kFewest) {
+    const auto count = static_cast<Eigen::Index>(differences_rad.size() / 3);
+    if (static_cast<std::size_t>(count) < AtRest::kFewest) {
       return std::nullopt;
     }
-    Variance found{static_cast<double>(lag) * step_s(), {}, sizes[0].size()};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double sigma = sigma_without_outliers(sizes[axis]);
-      found.rad2(static_cast<Eigen::Index>(axis)) = sigma * sigma / AtRest::kSquares;
+    Eigen::VectorXd scaled = Eigen::VectorXd::Map(differences_rad.data(), 3 * count);
+    Eigen::MatrixXd scaled_rows =
+        Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>>(by_alignments.data(), 3 * count, 6);
+    const auto of_axis = [&](Eigen::Index axis) { return Eigen::seqN(axis, count, 3); };
+    const auto sigma_of = [&](Eigen::Index axis) {
+      const Eigen::VectorXd its = scaled(of_axis(axis)).cwiseAbs();
+      std::vector<double> sizes(its.begin(), its.end());
+      return sigma_without_outliers(sizes);
+    };
+    Eigen::Array3d sigma_rad;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      sigma_rad(axis) = sigma_of(axis);
+      scaled(of_axis(axis)) /= sigma_rad(axis);
+      scaled_rows(of_axis(axis), Eigen::all) /= sigma_rad(axis);
+    }
+    scaled = without_alignments(scaled, scaled_rows);
+    Variance found{static_cast<double>(lag) * step_s(), {}, static_cast<std::size_t>(count)};
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      found.rad2(axis) = std::pow(sigma_rad(axis) * sigma_of(axis), 2) / AtRest::kSquares;
     }
     return found;
   }
@@ -92,6 +127,17 @@ class ErrorsAtRest {
                             0.5 * (off(1, 0) - off(0, 1)));
     });
     return off_rad;
+  }
+
+  /// How alignments change these rotations.
+  [[nodiscard]] std::array<ByAlignments, 5> by_alignments_from_first(const AtRest::Five& five) const {
+    const FixByGyros& first = fixes_[five.front()];
+    std::array<ByAlignments, 5> rows;
+    std::ranges::transform(five, rows.begin(), [&](std::size_t i) {
+      const Eigen::Matrix3d turn = fixes_[i].C_in_c.transpose() * first.C_in_c;
+      return ByAlignments(fixes_[i].by_alignments - turn * first.by_alignments);
+    });
+    return rows;
   }
 
   /// Whether fixes and gyros have turned alike, as far as alignments may be off: no fix that was frozen, no axis that
@@ -150,8 +196,10 @@ std::optional<ErrorModel> model_of(const std::vector<Variance>& variances) {
   constexpr double kStep = 1.05;
   constexpr double kSure = 3;  // sigmas
   ErrorModel best;
-  for (double time_s = variances.front().lag_s / 4; time_s < kLongest_s; time_s *= kStep) {
-    const ErrorModel model = model_with(time_s, variances);
+  const double shortest_s = variances.front().lag_s / 4;
+  const int steps = static_cast<int>(std::log(kLongest_s / shortest_s) / std::log(kStep));
+  for (int i = 0; i < steps; ++i) {
+    const ErrorModel model = model_with(shortest_s * std::pow(kStep, i), variances);
     best = model.misfit < best.misfit ? model : best;
   }
   const double more = model_with(kLongest_s, variances).misfit - best.misfit;
@@ -172,7 +220,7 @@ bool are_correlated(const Variance& near, const Variance& far) {
 
 std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, const GyroReadings& readings) {
   // Of what is left of the correlation the variance of a mean is so much more.
-  constexpr double kMoreOfMean = 0.15;
+  constexpr double kMoreOfMean = 0.1;
   const ErrorsAtRest errors(fixes, readings);
   if (!(errors.step_s() > 0)) {
     return std::nullopt;

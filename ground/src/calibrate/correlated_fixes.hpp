@@ -8,9 +8,9 @@
 
 namespace trihedron::ground {
 
-/// The star trackers whose fixes have such errors, by the gyros while the body does not slew (docs/mathematics.md,
-/// section 12). Not those whose errors stay alike for more than about a minute: with fixes far enough apart little
-/// would be left of the pass.
+/// The star trackers whose fixes have such errors, by the gyros while the body turns evenly (docs/mathematics.md,
+/// section 12). Not those whose errors stay alike for two minutes: with fixes far enough apart too few would be left of
+/// the pass.
 [[nodiscard]] std::vector<CorrelatedFixes> correlated_fixes(const Pass& pass);
 
 /// Leaves out the fixes of these star trackers that come too soon after the last one that stays, and counts them.

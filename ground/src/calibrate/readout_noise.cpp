@@ -240,6 +240,7 @@ double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_ra
   const GyroMask all = all_gyros(readings.gyros());
   AtRest at_rest;
   std::vector<double> angles_rad;
+  std::vector<Eigen::Array3d> axes_c;  ///< about which alignments turn the momenta apart
   std::vector<double> factors;
   std::size_t from = 0;
   Time next = readings.t(0);
@@ -253,6 +254,7 @@ double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_ra
       const Eigen::Vector3d& a = fitted->h_b[gyro];
       const Eigen::Vector3d& b = fitted->h_b[gyro + 1];
       angles_rad.push_back(std::atan2(a.cross(b).norm(), a.dot(b)));
+      axes_c.emplace_back(a.cross(b).normalized());
       factors.push_back(fitted->noise_factor);
       at_rest.add(to_seconds(t - readings.t(0)), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
     }
@@ -260,12 +262,28 @@ double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_ra
   at_rest.settle();
   double most = 1;
   for (const std::size_t lag : kLagsOfFits) {
-    std::vector<double> sizes;
+    std::vector<double> differences_rad;
+    std::vector<double> by_alignments;  // three each
     at_rest.for_each_five(lag, [&](const AtRest::Five& five) {
-      std::array<double, 5> its{};
-      std::ranges::transform(five, its.begin(), [&](std::size_t i) { return angles_rad[i]; });
-      sizes.push_back(std::abs(AtRest::fourth_difference(its)));
+      std::array<double, 5> angles{};
+      std::array<Eigen::Array3d, 5> axes;
+      std::ranges::transform(five, angles.begin(), [&](std::size_t i) { return angles_rad[i]; });
+      std::ranges::transform(five, axes.begin(), [&](std::size_t i) { return axes_c[i]; });
+      differences_rad.push_back(AtRest::fourth_difference(angles));
+      const Eigen::Array3d row = AtRest::fourth_difference(axes);
+      by_alignments.insert(by_alignments.end(), row.begin(), row.end());
     });
+    const auto count = std::ssize(differences_rad);
+    std::vector<double> sizes = differences_rad;
+    std::ranges::transform(sizes, sizes.begin(), [](double its) { return std::abs(its); });
+    if (sizes.size() >= AtRest::kFewest) {
+      const double before_rad = sigma_without_outliers(sizes);
+      const Eigen::VectorXd rest_rad =
+          before_rad *
+          without_alignments(Eigen::VectorXd::Map(differences_rad.data(), count) / before_rad,
+                             Eigen::Matrix3Xd::Map(by_alignments.data(), 3, count).transpose() / before_rad);
+      std::ranges::transform(rest_rad, sizes.begin(), [](double its) { return std::abs(its); });
+    }
     if (sizes.size() >= AtRest::kFewest) {
       const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(sizes.size()));
       const double told_rad = median_of(factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
@@ -299,22 +317,28 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
   noise.gyros = std::min({pass.gyro.gyros, static_cast<int>(pass.settings.gyros.size()), kMaxGyros});
   const Angles angles(pass, noise.gyros);
   const PerGyro<std::vector<double>> by_hours = noise_by_hours(pass, angles, noise.gyros);
-  bool is_other = false;
+  bool is_found = true;
   for (int k = 0; k < noise.gyros; ++k) {
     noise.told_rad[k] = noise.found_rad[k] = noise.most_rad[k] =
         pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
+    noise.lasting[k] = 1;
     if (const std::vector<double>& hours = by_hours[k]; !hours.empty()) {
       noise.found_rad[k] = hours[hours.size() / 2];
       noise.most_rad[k] = hours.back();
+    } else {
+      is_found = false;
     }
   }
-  noise.lasting = lasting_noise(pass, noise.found_rad, noise.gyros);
+  noise.in_slews = noise_in_slews_over_rest(pass, angles, noise.gyros);
+  if (is_found && noise.is_steady()) {
+    noise.lasting = lasting_noise(pass, noise.found_rad, noise.gyros);
+  }
+  bool is_other = false;
   for (int k = 0; k < noise.gyros; ++k) {
     noise.found_rad[k] *= noise.lasting[k];
     noise.most_rad[k] *= noise.lasting[k];
     is_other = is_other || std::abs(noise.found_rad[k] - noise.told_rad[k]) > kTolerance * noise.told_rad[k];
   }
-  noise.in_slews = noise_in_slews_over_rest(pass, angles, noise.gyros);
   return is_other || !noise.is_steady() ? std::optional(noise) : std::nullopt;
 }
 
