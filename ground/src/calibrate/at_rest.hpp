@@ -1,7 +1,6 @@
 #pragma once
 /// Noise of what changes smoothly while the body turns evenly.
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -116,17 +115,10 @@ class AtRest {
   double farthest_s_ = 0;
 };
 
-/// What is left of fourth differences, of unit 1-sigma but for outliers, when the alignments are taken for those that
-/// make the least of them: a body that wobbles shows them. `by_alignments`: how rad of each change the differences.
-[[nodiscard]] inline Eigen::VectorXd without_alignments(const Eigen::VectorXd& differences,
-                                                        const Eigen::MatrixXd& by_alignments) {
-  constexpr double kAlignment_rad = 0.02;
-  constexpr double kOutlier = 6;
-  const Eigen::VectorXd used = (differences.array().abs() < kOutlier).cast<double>();
-  Eigen::MatrixXd information = by_alignments.transpose() * used.asDiagonal() * by_alignments;
-  information.diagonal().array() += 1 / (kAlignment_rad * kAlignment_rad);
-  const Eigen::VectorXd by_all = by_alignments.transpose() * used.cwiseProduct(differences);
-  return differences - by_alignments * information.ldlt().solve(by_all);
-}
+/// 1-sigmas of fourth differences that were taken about `axes` axes in turn, less what they have of the alignments of
+/// least squares, which a body that wobbles shows. `by_alignments`: how rad of each change the differences. Outliers do
+/// not count. Needs differences.
+[[nodiscard]] Eigen::ArrayXd sigmas_less_alignments(Eigen::VectorXd differences, Eigen::MatrixXd by_alignments,
+                                                    Eigen::Index axes);
 
 }  // namespace trihedron::ground

@@ -88,31 +88,15 @@ class ErrorsAtRest {
         by_alignments.insert(by_alignments.end(), rows.data(), rows.data() + rows.size());
       }
     });
-    const auto count = static_cast<Eigen::Index>(differences_rad.size() / 3);
-    if (static_cast<std::size_t>(count) < AtRest::kFewest) {
+    const std::size_t count = differences_rad.size() / 3;
+    if (count < AtRest::kFewest) {
       return std::nullopt;
     }
-    Eigen::VectorXd scaled = Eigen::VectorXd::Map(differences_rad.data(), 3 * count);
-    Eigen::MatrixXd scaled_rows =
-        Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>>(by_alignments.data(), 3 * count, 6);
-    const auto of_axis = [&](Eigen::Index axis) { return Eigen::seqN(axis, count, 3); };
-    const auto sigma_of = [&](Eigen::Index axis) {
-      const Eigen::VectorXd its = scaled(of_axis(axis)).cwiseAbs();
-      std::vector<double> sizes(its.begin(), its.end());
-      return sigma_without_outliers(sizes);
-    };
-    Eigen::Array3d sigma_rad;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      sigma_rad(axis) = sigma_of(axis);
-      scaled(of_axis(axis)) /= sigma_rad(axis);
-      scaled_rows(of_axis(axis), Eigen::all) /= sigma_rad(axis);
-    }
-    scaled = without_alignments(scaled, scaled_rows);
-    Variance found{static_cast<double>(lag) * step_s(), {}, static_cast<std::size_t>(count)};
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      found.rad2(axis) = std::pow(sigma_rad(axis) * sigma_of(axis), 2) / AtRest::kSquares;
-    }
-    return found;
+    const auto size = static_cast<Eigen::Index>(differences_rad.size());
+    const Eigen::Array3d sigma_rad = sigmas_less_alignments(
+        Eigen::VectorXd::Map(differences_rad.data(), size),
+        Eigen::Matrix<double, 6, Eigen::Dynamic>::Map(by_alignments.data(), 6, size).transpose(), 3);
+    return Variance{static_cast<double>(lag) * step_s(), sigma_rad.square() / AtRest::kSquares, count};
   }
 
  private:

@@ -260,6 +260,10 @@ double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_ra
     }
   }
   at_rest.settle();
+  if (factors.empty()) {
+    return 1;
+  }
+  const double told_rad = median_of(factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
   double most = 1;
   for (const std::size_t lag : kLagsOfFits) {
     std::vector<double> differences_rad;
@@ -274,20 +278,13 @@ double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_ra
       by_alignments.insert(by_alignments.end(), row.begin(), row.end());
     });
     const auto count = std::ssize(differences_rad);
-    std::vector<double> sizes = differences_rad;
-    std::ranges::transform(sizes, sizes.begin(), [](double its) { return std::abs(its); });
-    if (sizes.size() >= AtRest::kFewest) {
-      const double before_rad = sigma_without_outliers(sizes);
-      const Eigen::VectorXd rest_rad =
-          before_rad *
-          without_alignments(Eigen::VectorXd::Map(differences_rad.data(), count) / before_rad,
-                             Eigen::Matrix3Xd::Map(by_alignments.data(), 3, count).transpose() / before_rad);
-      std::ranges::transform(rest_rad, sizes.begin(), [](double its) { return std::abs(its); });
-    }
-    if (sizes.size() >= AtRest::kFewest) {
-      const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(sizes.size()));
-      const double told_rad = median_of(factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
-      const double ratio = std::pow(sigma_without_outliers(sizes) / told_rad, 2) / AtRest::kSquares;
+    if (differences_rad.size() >= AtRest::kFewest) {
+      const double its_rad =
+          sigmas_less_alignments(Eigen::VectorXd::Map(differences_rad.data(), count),
+                                 Eigen::Matrix3Xd::Map(by_alignments.data(), 3, count).transpose(), 1)
+              .value();
+      const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(count));
+      const double ratio = std::pow(its_rad / told_rad, 2) / AtRest::kSquares;
       most = ratio > std::pow(kMoreThanReadings, 2) + kSureOfMore * chance ? std::max(most, std::sqrt(ratio)) : most;
     }
   }

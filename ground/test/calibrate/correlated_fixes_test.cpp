@@ -154,6 +154,29 @@ TEST(CorrelatedFixes, AreNotLookedForByEstimatorPaper) {
   EXPECT_TRUE(calibrate(with_errors(10).pass, {.estimator = Estimator::kPaper}).correlated_fixes.empty());
 }
 
+TEST(CorrelatedFixes, AreNotWhatABodyThatWobblesShowsOfTheAlignments) {
+  Scenario scenario = scenario_in_eq1(1, kPass);
+  scenario.attitude.jitter_rad = 0.1 * kDegree;
+  scenario.attitude.jitter_bandwidth_hz = 0.005;
+  EXPECT_TRUE(correlated_fixes(sim::simulate(scenario).pass).empty());
+}
+
+TEST(CorrelatedFixes, AreFoundWhereTheBodyIsSteeredInYaw) {
+  Scenario scenario = scenario_in_eq1(1, kPass);
+  scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+  Pass pass = sim::simulate(scenario).pass;
+  EXPECT_TRUE(correlated_fixes(pass).empty());
+  add_errors(pass.star_tracker, 20, kErrors_rad, 1);
+  EXPECT_EQ(correlated_fixes(pass).size(), 1U);
+}
+
+TEST(CorrelatedFixes, AreNotThoseOfAStarTrackerThatIsFrozen) {
+  Pass pass = sim::simulate(scenario_in_eq1(1, kPass)).pass;
+  auto& q_in_c = pass.star_tracker.q_in_c;
+  std::fill(q_in_c.begin() + 3000, q_in_c.begin() + 4200, q_in_c[3000]);
+  EXPECT_TRUE(correlated_fixes(pass).empty());
+}
+
 TEST(CorrelatedFixes, AreNotThoseOfErrorsThatLast) { EXPECT_TRUE(correlated_fixes(with_errors(600).pass).empty()); }
 
 TEST(CorrelatedFixes, OfFewAreNotLookedFor) {

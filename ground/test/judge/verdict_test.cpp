@@ -407,6 +407,11 @@ TEST(Verdict, FindsThatTheFilterWasReopened) {
   auto run = good_run();
   run.calibration.statistics.reopened = 1;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("reopened"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.calibration.statistics.fixes_used = 499;
+  const Verdict of_few = judge(good_pass(), run);
+  EXPECT_FALSE(of_few.trustworthy);
+  EXPECT_THAT(of_few.findings.at(0).evidence, HasSubstr("499 fixes used"));
 }
 
 TEST(Verdict, FindsNisOutOfBoundsOnBothSides) {
