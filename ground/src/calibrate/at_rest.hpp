@@ -4,19 +4,17 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
-#include "model/scatter.hpp"
 #include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 
 /// Times at which something was seen, and the fourth differences x_0 − 4 x_1 + 6 x_2 − 4 x_3 + x_4 of it at five of
-/// them that are evenly apart, between which the body turns at its usual rate: what the alignments are off and the
-/// gyros drift is not in them. Where the errors of x at these five are independent, the variance of such a difference
-/// is kSquares times theirs.
+/// them that are evenly apart, over which the body turns as for most of the ten minutes around: what the gyros drift is
+/// not in them. Where the errors of x at these five are independent, the variance of such a difference is kSquares
+/// times theirs.
 class AtRest {
  public:
   static constexpr double kSquares = 1 + 16 + 36 + 16 + 1;
@@ -37,37 +35,7 @@ class AtRest {
     rates_rad_s_.insert(rates_rad_s_.end(), rate_rad_s.begin(), rate_rad_s.end());
   }
   /// When all times are added.
-  void settle() {
-    if (t_s_.size() <= kFewest) {
-      return;
-    }
-    std::vector<double> steps_s;
-    for (std::size_t i = 1; i < t_s_.size(); ++i) {
-      steps_s.push_back(t_s_[i] - t_s_[i - 1]);
-    }
-    step_s_ = median_of(steps_s);
-    const auto rates = Eigen::Matrix3Xd::Map(rates_rad_s_.data(), 3, static_cast<Eigen::Index>(t_s_.size()));
-    const Eigen::ArrayXd sizes_rad_s = rates.colwise().norm();
-    std::vector<double> sorted_rad_s(sizes_rad_s.begin(), sizes_rad_s.end());
-    const double usual_rad_s = median_of(sorted_rad_s);
-    farthest_s_ = std::min(kFarthest_s, kFarthestTurn_rad / usual_rad_s);
-    const double rest_rad_s = std::max(kSlowest_rad_s, kPartOfUsual * usual_rad_s);
-    in_motion_ = {0};
-    Eigen::Index begin = 0;
-    while (begin < rates.cols()) {
-      const double until_s = t_s_[static_cast<std::size_t>(begin)] + kStretch_s;
-      Eigen::Index end = begin;
-      while (end < rates.cols() && t_s_[static_cast<std::size_t>(end)] < until_s) {
-        ++end;
-      }
-      end = std::max(end, begin + 1);
-      const Eigen::Vector3d its_rad_s = medians_of(rates.middleCols(begin, end - begin));
-      for (; begin < end; ++begin) {
-        const bool rests = (rates.col(begin) - its_rad_s).norm() < rest_rad_s;
-        in_motion_.push_back(in_motion_.back() + (rests ? 0 : 1));
-      }
-    }
-  }
+  void settle();
 
   /// Median of the times from one to the next; 0 where there are too few.
   [[nodiscard]] double step_s() const { return step_s_; }

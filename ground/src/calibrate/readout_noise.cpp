@@ -225,77 +225,97 @@ double noise_in_slews_over_rest(const Pass& pass, const Angles& angles, int gyro
   return most;
 }
 
-/// By how much more than single readings of noise without correlation say, these 1-sigmas, the angle between the
-/// momenta of a gyro and the next one scatters where readings are fitted together, as for a fix; 1 where it is no more,
-/// or not known.
-double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_rad, int gyro) {
-  constexpr std::size_t kLagsOfFits[] = {1, 4, 12};
-  constexpr double kMoreThanReadings = 1.2;
-  constexpr double kSureOfMore = 5;
-  const GyroReadings readings(pass);
-  if (readings.size() < 2 || !(noise_rad[gyro] > 0) || !(noise_rad[gyro + 1] > 0)) {
-    return 1;
+/// Angles between the momenta of a gyro and the next one by readings that are fitted together, as for a fix; no two of
+/// these fits share a reading, and there is no spike in them by these 1-sigmas.
+struct AnglesOfFits {
+  AnglesOfFits(const GyroReadings& readings, const PerGyro<double>& noise_rad, int gyro) {
+    const Duration apart = 2 * readings.reach();
+    const GyroMask all = all_gyros(readings.gyros());
+    std::size_t from = 0;
+    Time next = readings.t(0);
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      const Time t = readings.t(i);
+      if (t < next) {
+        continue;
+      }
+      next = t + apart;
+      const std::optional<FittedDirections> fitted = readings.at(t, from);
+      if (fitted && fitted->explains(all, noise_rad)) {
+        const Eigen::Vector3d& a = fitted->h_b[gyro];
+        const Eigen::Vector3d& b = fitted->h_b[gyro + 1];
+        angles_rad.push_back(std::atan2(a.cross(b).norm(), a.dot(b)));
+        axes_c.emplace_back(a.cross(b).normalized());
+        noise_factors.push_back(fitted->noise_factor);
+        at_rest.add(to_seconds(t - readings.t(0)), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
+      }
+    }
+    at_rest.settle();
   }
-  const Duration apart = 2 * readings.reach();  // so that fits share no reading
-  const GyroMask all = all_gyros(readings.gyros());
+
   AtRest at_rest;
   std::vector<double> angles_rad;
   std::vector<Eigen::Array3d> axes_c;  ///< about which alignments turn the momenta apart
-  std::vector<double> factors;
-  std::size_t from = 0;
-  Time next = readings.t(0);
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    const Time t = readings.t(i);
-    if (t < next) {
-      continue;
-    }
-    next = t + apart;
-    if (const std::optional<FittedDirections> fitted = readings.at(t, from)) {
-      const Eigen::Vector3d& a = fitted->h_b[gyro];
-      const Eigen::Vector3d& b = fitted->h_b[gyro + 1];
-      angles_rad.push_back(std::atan2(a.cross(b).norm(), a.dot(b)));
-      axes_c.emplace_back(a.cross(b).normalized());
-      factors.push_back(fitted->noise_factor);
-      at_rest.add(to_seconds(t - readings.t(0)), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
-    }
-  }
-  at_rest.settle();
-  if (factors.empty()) {
-    return 1;
-  }
-  const double told_rad = median_of(factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
-  double most = 1;
-  for (const std::size_t lag : kLagsOfFits) {
-    std::vector<double> differences_rad;
-    std::vector<double> by_alignments;  // three each
-    at_rest.for_each_five(lag, [&](const AtRest::Five& five) {
-      std::array<double, 5> angles{};
-      std::array<Eigen::Array3d, 5> axes;
-      std::ranges::transform(five, angles.begin(), [&](std::size_t i) { return angles_rad[i]; });
-      std::ranges::transform(five, axes.begin(), [&](std::size_t i) { return axes_c[i]; });
+  std::vector<double> noise_factors;   ///< over that of a reading
+};
+
+/// Variance of an angle by angles so many fits apart, over `told_rad2`; 1 where it is more by chance alone, or not
+/// known.
+double variance_over(double told_rad2, const AnglesOfFits& fits, std::size_t lag) {
+  constexpr double kMoreThanReadings = 1.2;
+  constexpr double kSureOfMore = 5;
+  constexpr double kMostChange_rad = 1e-3;
+  constexpr double kOfTurn = 0.2;
+  std::vector<double> differences_rad;
+  std::vector<double> by_alignments;  // three each
+  fits.at_rest.for_each_five(lag, [&](const AtRest::Five& five) {
+    std::array<double, 5> angles{};
+    std::array<Eigen::Array3d, 5> axes;
+    std::ranges::transform(five, angles.begin(), [&](std::size_t i) { return fits.angles_rad[i]; });
+    std::ranges::transform(five, axes.begin(), [&](std::size_t i) { return fits.axes_c[i]; });
+    // More is no alignment, but axes that are exchanged.
+    const double turned = (axes.back() - axes.front()).matrix().norm();
+    if (std::abs(angles.back() - angles.front()) < kMostChange_rad + kOfTurn * turned) {
       differences_rad.push_back(AtRest::fourth_difference(angles));
       const Eigen::Array3d row = AtRest::fourth_difference(axes);
       by_alignments.insert(by_alignments.end(), row.begin(), row.end());
-    });
-    const auto count = std::ssize(differences_rad);
-    if (differences_rad.size() >= AtRest::kFewest) {
-      const double its_rad =
-          sigmas_less_alignments(Eigen::VectorXd::Map(differences_rad.data(), count),
-                                 Eigen::Matrix3Xd::Map(by_alignments.data(), 3, count).transpose(), 1)
-              .value();
-      const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(count));
-      const double ratio = std::pow(its_rad / told_rad, 2) / AtRest::kSquares;
-      most = ratio > std::pow(kMoreThanReadings, 2) + kSureOfMore * chance ? std::max(most, std::sqrt(ratio)) : most;
     }
+  });
+  const auto count = std::ssize(differences_rad);
+  if (differences_rad.size() < AtRest::kFewest) {
+    return 1;
   }
-  return most;
+  const double its_rad = sigmas_less_alignments(Eigen::VectorXd::Map(differences_rad.data(), count),
+                                                Eigen::Matrix3Xd::Map(by_alignments.data(), 3, count).transpose(), 1)
+                             .value();
+  const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(count));
+  const double ratio = its_rad * its_rad / AtRest::kSquares / told_rad2;
+  return ratio > std::pow(kMoreThanReadings, 2) + kSureOfMore * chance ? ratio : 1;
+}
+
+/// By how much more than single readings of noise without correlation say, these 1-sigmas, the angle between the
+/// momenta of a gyro and the next one scatters where readings are fitted together; 1 where it is no more, or not known.
+double noise_of_fits_over_told(const GyroReadings& readings, const PerGyro<double>& noise_rad, int gyro) {
+  if (readings.size() == 0 || !(noise_rad[gyro] > 0) || !(noise_rad[gyro + 1] > 0)) {
+    return 1;
+  }
+  AnglesOfFits fits(readings, noise_rad, gyro);
+  if (fits.noise_factors.empty()) {
+    return 1;
+  }
+  const double told_rad = median_of(fits.noise_factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
+  double most = 1;
+  for (const std::size_t lag : {std::size_t{1}, std::size_t{4}, std::size_t{12}}) {
+    most = std::max(most, variance_over(told_rad * told_rad, fits, lag));
+  }
+  return std::sqrt(most);
 }
 
 /// The same of each gyro by itself: it is in all angles to others.
 PerGyro<double> lasting_noise(const Pass& pass, const PerGyro<double>& noise_rad, int gyros) {
+  const GyroReadings readings(pass);
   PerGyro<double> times{};
   for (int k = 0; k + 1 < gyros; ++k) {
-    const double its = noise_of_fits_over_told(pass, noise_rad, k);
+    const double its = noise_of_fits_over_told(readings, noise_rad, k);
     times[k] = k == 0 ? its : std::min(times[k], its);
     times[k + 1] = its;
   }

@@ -190,6 +190,15 @@ TEST(ReadoutNoise, ThatHasPassedAFilterIsThatOfReadingsTogether) {
   EXPECT_TRUE(noise->is_steady());
 }
 
+TEST(ReadoutNoise, OfReadingsTogetherIsNotMovedBySpikes) {
+  Pass pass = two_hours().pass;
+  std::mt19937_64 random(2);
+  for (double& component : pass.gyro.h) {
+    component += random() % 600 == 0 ? 1e-3 : 0;
+  }
+  EXPECT_FALSE(other_readout_noise(pass));
+}
+
 TEST(ReadoutNoise, ThatLastsIsFoundAndNamed) {
   sim::SimulatedPass simulated = two_hours();
   std::mt19937_64 random(1);
