@@ -334,7 +334,7 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
   noise.gyros = std::min({pass.gyro.gyros, static_cast<int>(pass.settings.gyros.size()), kMaxGyros});
   const Angles angles(pass, noise.gyros);
   const PerGyro<std::vector<double>> by_hours = noise_by_hours(pass, angles, noise.gyros);
-  bool is_found = true;
+  bool is_found = noise.gyros >= 2;
   for (int k = 0; k < noise.gyros; ++k) {
     noise.told_rad[k] = noise.found_rad[k] = noise.most_rad[k] =
         pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
