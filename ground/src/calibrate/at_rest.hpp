@@ -30,6 +30,14 @@ class AtRest {
     return x[0] + x[4] - 4 * (x[1] + x[3]) + 6 * x[2];
   }
 
+  /// Whether what has changed so while the body turned by so much may be that of alignments and noise. More is a star
+  /// tracker that is frozen, or axes that are exchanged.
+  [[nodiscard]] static bool may_be_alignment(double change_rad, double turned_rad) {
+    constexpr double kNoise_rad = 1.5e-3;  // 5′
+    constexpr double kAlignment_rad = 0.2;
+    return change_rad < kNoise_rad + kAlignment_rad * turned_rad;
+  }
+
   void add(double t_s, const Eigen::Vector3d& rate_rad_s) {
     t_s_.push_back(t_s);
     rates_rad_s_.insert(rates_rad_s_.end(), rate_rad_s.begin(), rate_rad_s.end());
@@ -72,6 +80,7 @@ class AtRest {
  private:
   static constexpr double kFarthest_s = 240;
   static constexpr double kFarthestTurn_rad = 0.2;
+  // By vectors: a slow slew against the turn of the orbit changes the size of the rate by little.
   static constexpr double kSlowest_rad_s = 0.01 * kDegree;
   static constexpr double kPartOfUsual = 0.2;
   static constexpr double kStretch_s = 600;  ///< of which a rate is the usual one

@@ -423,11 +423,8 @@ struct OfIndependentFixes {
   Pass pass;
   std::vector<CorrelatedFixes> left_out;
 };
-std::optional<OfIndependentFixes> of_independent_fixes(const Pass& pass, const CalibrationOptions& options) {
-  std::vector<CorrelatedFixes> correlated;
-  if (options.find_noise && options.estimator != Estimator::kPaper) {
-    correlated = correlated_fixes(pass);
-  }
+std::optional<OfIndependentFixes> of_independent_fixes(const Pass& pass) {
+  std::vector<CorrelatedFixes> correlated = correlated_fixes(pass);
   if (correlated.empty()) {
     return std::nullopt;
   }
@@ -500,7 +497,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   }
   const Pass& in_step = corrected ? *corrected : pass;
   refuse_restarted_gyro(in_step);
-  const std::optional<OfIndependentFixes> independent = of_independent_fixes(in_step, options);
+  const std::optional<OfIndependentFixes> independent = finds_noise ? of_independent_fixes(in_step) : std::nullopt;
   const Pass& of_independent = independent ? independent->pass : in_step;
   const CalibrationOptions asked = with_clock_states(options, correction);
   std::optional<WithoutErrorsBesideOutages> without_errors;
@@ -544,7 +541,8 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
-  const std::optional<OfIndependentFixes> independent = of_independent_fixes(as_stamped, options);
+  const std::optional<OfIndependentFixes> independent =
+      options.find_noise ? of_independent_fixes(as_stamped) : std::nullopt;
   const Pass& stamped = independent ? independent->pass : as_stamped;
   Pipeline pipeline(stamped.settings, settled_for_flight(stamped.settings, options));
   NavigationRecorder recorder;

@@ -81,7 +81,7 @@ class ErrorsAtRest {
     std::vector<double> by_alignments;    // 3 × 6 each, row by row
     at_rest_.for_each_five(lag, [&](const AtRest::Five& five) {
       const std::array<Eigen::Array3d, 5> off_rad = off_from_first(five);
-      if (is_near(five, off_rad.back())) {
+      if (AtRest::may_be_alignment(off_rad.back().matrix().norm(), turned_rad(five))) {
         const Eigen::Array3d difference = AtRest::fourth_difference(off_rad);
         const ByAlignments rows = AtRest::fourth_difference(by_alignments_from_first(five));
         differences_rad.insert(differences_rad.end(), difference.begin(), difference.end());
@@ -124,15 +124,8 @@ class ErrorsAtRest {
     return rows;
   }
 
-  /// Whether fixes and gyros have turned alike, as far as alignments may be off: no fix that was frozen, no axis that
-  /// is exchanged.
-  [[nodiscard]] bool is_near(const AtRest::Five& five, const Eigen::Array3d& last_rad) const {
-    constexpr double kOfTurn = 0.2;
-    constexpr double kMost_rad = 1.5e-3;  // 5′
-    const FixByGyros& first = fixes_[five.front()];
-    const FixByGyros& last = fixes_[five.back()];
-    const double turned_rad = (last.C_c_g - first.C_c_g).norm() / std::numbers::sqrt2;
-    return last_rad.matrix().norm() < kMost_rad + kOfTurn * turned_rad;
+  [[nodiscard]] double turned_rad(const AtRest::Five& five) const {
+    return (fixes_[five.back()].C_c_g - fixes_[five.front()].C_c_g).norm() / std::numbers::sqrt2;
   }
 
   std::vector<FixByGyros> fixes_;

@@ -263,8 +263,6 @@ struct AnglesOfFits {
 double variance_over(double told_rad2, const AnglesOfFits& fits, std::size_t lag) {
   constexpr double kMoreThanReadings = 1.2;
   constexpr double kSureOfMore = 5;
-  constexpr double kMostChange_rad = 1e-3;
-  constexpr double kOfTurn = 0.2;
   std::vector<double> differences_rad;
   std::vector<double> by_alignments;  // three each
   fits.at_rest.for_each_five(lag, [&](const AtRest::Five& five) {
@@ -272,9 +270,8 @@ double variance_over(double told_rad2, const AnglesOfFits& fits, std::size_t lag
     std::array<Eigen::Array3d, 5> axes;
     std::ranges::transform(five, angles.begin(), [&](std::size_t i) { return fits.angles_rad[i]; });
     std::ranges::transform(five, axes.begin(), [&](std::size_t i) { return fits.axes_c[i]; });
-    // More is no alignment, but axes that are exchanged.
-    const double turned = (axes.back() - axes.front()).matrix().norm();
-    if (std::abs(angles.back() - angles.front()) < kMostChange_rad + kOfTurn * turned) {
+    const double turned_rad = (axes.back() - axes.front()).matrix().norm();
+    if (AtRest::may_be_alignment(std::abs(angles.back() - angles.front()), turned_rad)) {
       differences_rad.push_back(AtRest::fourth_difference(angles));
       const Eigen::Array3d row = AtRest::fourth_difference(axes);
       by_alignments.insert(by_alignments.end(), row.begin(), row.end());

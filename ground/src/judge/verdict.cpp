@@ -57,6 +57,7 @@ constexpr double kMostlyRejected = 0.2;
 /// One in twenty.
 constexpr double kManyRejected = 0.05;
 constexpr double kBadlyPlacedSine = 0.5;
+/// Fewer fixes do not tell what the filter lost the momenta by.
 constexpr long kFewAfterReopening = 500;
 /// Degree of the polynomial through the samples round a fix.
 constexpr int kCubic = 3;
@@ -111,7 +112,6 @@ void judge_rejections(const Statistics& statistics, std::vector<Finding>& findin
         "The filter lost the momenta and had to set them free: the model did not hold between fixes.",
         fmt::format("{} time(s), each after a run of rejections", statistics.reopened),
         "Raise the process noise, or look there for a gap, a jump of the tracker or drift outside the model.");
-    // What happened there takes many fixes to be told.
     if (statistics.fixes_used < kFewAfterReopening) {
       findings.back().evidence += fmt::format("; {} fixes used", statistics.fixes_used);
       findings.back().severity = Severity::kDoNotUse;

@@ -53,9 +53,9 @@ TEST(CorrelatedFixes, AreLeftOutSoThatThoseThatStayAreIndependent) {
     ASSERT_EQ(run.correlated_fixes.size(), 1U);
     const CorrelatedFixes& its = run.correlated_fixes[0];
     EXPECT_EQ(its.head, 0);
-    EXPECT_NEAR(its.time_s, 10, 2);
-    EXPECT_GT(its.part, 0.9);
-    EXPECT_NEAR(its.apart_s, 27, 6);
+    EXPECT_NEAR(its.time_s, 10, 2);  // a step of the search is 5 %, chance in six hours some percent more
+    EXPECT_GT(its.part, 0.9);        // all but 0.3″ and what the readings have
+    EXPECT_NEAR(its.apart_s, 3.04 * its.time_s, 3);
     EXPECT_EQ(static_cast<std::size_t>(its.left_out) + run.fixes.size(), simulated.pass.star_tracker.size());
     EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kCorrelatedFixes));
     EXPECT_TRUE(run.calibration.verdict.trustworthy);
@@ -73,7 +73,7 @@ TEST(CorrelatedFixes, AreFoundForTimesOfAMinute) {
   const sim::SimulatedPass simulated = with_errors(60);
   const CalibrationRun run = calibrate(simulated.pass, {});
   ASSERT_EQ(run.correlated_fixes.size(), 1U);
-  EXPECT_NEAR(run.correlated_fixes[0].time_s, 60, 25);
+  EXPECT_NEAR(run.correlated_fixes[0].time_s, 60, 25);  // six hours have few differences over minutes
   EXPECT_TRUE(run.calibration.verdict.trustworthy);
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
 }
@@ -101,7 +101,7 @@ TEST(CorrelatedFixes, AreFoundWhereAPartOfTheErrorsIsAlike) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found[0].part, 0.31, 0.1);  // of 1 + 4/9
   EXPECT_NEAR(found[0].time_s, 30, 15);
-  EXPECT_NEAR(found[0].apart_s, 49, 20);
+  EXPECT_NEAR(found[0].apart_s, found[0].time_s * std::log(1 + found[0].part / 0.05), 3);
 }
 
 TEST(CorrelatedFixes, AreFoundBesideDropoutsAndStampsThatJitter) {
