@@ -156,8 +156,9 @@ TEST(CorrelatedFixes, AreNotLookedForByEstimatorPaper) {
 
 TEST(CorrelatedFixes, AreNotWhatABodyThatWobblesShowsOfTheAlignments) {
   Scenario scenario = scenario_in_eq1(1, kPass);
-  scenario.attitude.jitter_rad = 0.1 * kDegree;
-  scenario.attitude.jitter_bandwidth_hz = 0.005;
+  scenario.star_tracker.noise_rad = 0.3 * kErrors_rad;
+  scenario.attitude.jitter_rad = 0.05 * kDegree;
+  scenario.attitude.jitter_bandwidth_hz = 0.015;
   EXPECT_TRUE(correlated_fixes(sim::simulate(scenario).pass).empty());
 }
 
