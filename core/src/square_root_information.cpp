@@ -352,8 +352,11 @@ void rotate_into(RowsView root, RowsView extra, int eliminated) {
 void triangularise(RowsView rows, int columns) {
   for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
     const int rest = rows.columns - j;
-    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride},
-                1);
+    int below = rows.rows - j - 1;
+    while (below > 0 && rows(j + below, j) == 0) {
+      --below;
+    }
+    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, below, rest, rows.stride}, 1);
   }
 }
 

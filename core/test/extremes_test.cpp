@@ -165,7 +165,7 @@ TEST(Extremes, ReadingsEndInAStatusAndDoNotSpoilTheEstimate) {
 TEST(Extremes, LostEstimateIsStartedAgainByTheNextFix) {
   const Flight flight = short_flight();
   test::PaperGiven given;
-  given.setup.direction_random_walk_rad_sqrt_s = 1e60;
+  given.setup.direction_random_walk_rad_sqrt_s = 1e200;
   const auto on_board = given.on_board();
   bool was_lost = false;
   int started_after_loss = 0;

@@ -110,6 +110,30 @@ TEST(SquareRootInformation, AgreesWithTheTextbookFilterOverManySteps) {
   }
 }
 
+TEST(SquareRootInformation, TakesNoiseOfAnySize) {
+  // Some components with noise far above what was known of them, some with little: the covariance in twice the digits.
+  using Long = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> decades(-4, 4);
+  for (int trial = 0; trial < 200; ++trial) {
+    Filter filter = empty();
+    add_information(filter, random_matrix(kStates + 2, kStates, random));
+    const Long before = root(filter).cast<long double>().triangularView<Eigen::Upper>();
+    const Matrix A = Matrix::Identity(kDynamic, kDynamic) + 0.1 * random_matrix(kDynamic, kDynamic, random);
+    const Matrix B = random_matrix(kDynamic, kStates - kDynamic, random);
+    const Eigen::VectorXd noise = Eigen::VectorXd::NullaryExpr(kDynamic, [&] { return std::pow(10, decades(random)); });
+    filter.propagate(A.inverse(), B, noise);
+    Long F = Long::Identity(kStates, kStates);
+    F.topRows(kDynamic) << A.cast<long double>(), B.cast<long double>();
+    const Long through = F * before.inverse();
+    Long P = through * through.transpose();
+    P.topLeftCorner(kDynamic, kDynamic) += noise.cast<long double>().cwiseAbs2().asDiagonal();
+    // R P Rᵀ is one, whatever the sizes of the components.
+    const Long R = root(filter).cast<long double>().triangularView<Eigen::Upper>();
+    EXPECT_LT((R * P * R.transpose() - Long::Identity(kStates, kStates)).norm(), 1e-10L) << trial;
+  }
+}
+
 TEST(SquareRootInformation, GivesTheFirstRowsOfItsInverse) {
   std::mt19937 random(5);
   Filter filter = empty();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "batch/gram.hpp"
 #include "model/scatter.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/stop.hpp"
@@ -21,6 +22,34 @@ constexpr double kLag_s = 30;
 constexpr double kBound = 2;
 /// The fewest stretches of the pass from which a scatter is told.
 constexpr long kLeastStretches = 8;
+
+/// Rows of several turns, until there are enough of them that a product is worth its beginning.
+class Gathered {
+ public:
+  explicit Gathered(Eigen::Index unknowns) : columns_(unknowns, kTogether) {}
+
+  /// Where there is no room for them, those before go into `normal`, lower triangle.
+  template <class Rows>
+  void add(const Rows& rows, MatrixXd& normal) {
+    if (count_ + rows.rows() > kTogether) {
+      put_into(normal);
+    }
+    columns_.middleCols(count_, rows.rows()) = rows.transpose();
+    count_ += rows.rows();
+  }
+  void put_into(MatrixXd& normal) {
+    if (count_ > 0) {
+      columns_.rightCols(kTogether - count_).setZero();
+      add_gram(columns_, 1, normal);
+      count_ = 0;
+    }
+  }
+
+ private:
+  static constexpr Eigen::Index kTogether = 64;
+  MatrixXd columns_;
+  Eigen::Index count_ = 0;
+};
 
 }  // namespace
 
@@ -237,18 +266,11 @@ bool TurnFit::step(bool roughly) {
   VectorXd of_turn(n);
   VectorXd sum = VectorXd::Zero(n);
   long number = 0;
-  // Rows of several turns, until there are enough of them that a product is worth its beginning.
-  constexpr Eigen::Index kTogether = 64;
-  MatrixXd gathered(n, kTogether + kMostRows);
-  Eigen::Index count = 0;
-  const auto put_into_normal = [&] {
-    if (count > 0) {
-      stretch.normal.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
-      count = 0;
-    }
-  };
+  Gathered used(n);
+  Gathered rejected(n);
   const auto close = [&] {
-    put_into_normal();
+    used.put_into(stretch.normal);
+    rejected.put_into(stretch.rejected_normal);
     if (stretch.turns > 0) {
       sum += stretch.score;
       normal += stretch.normal;
@@ -278,15 +300,11 @@ bool TurnFit::step(bool roughly) {
     stretch.interval.until = turn.second;
     stretch.bounded_score += std::min(1.0, kBound * std::sqrt(usual / square)) * of_turn;
     if (square > kGate * kGate * usual) {
-      stretch.rejected_normal.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(n).transpose());
+      rejected.add(rows.leftCols(n), stretch.rejected_normal);
       continue;
     }
     shown_by_noise_ += noise_square;
-    gathered.middleCols(count, rows.rows()) = rows.leftCols(n).transpose();
-    count += rows.rows();
-    if (count >= kTogether) {
-      put_into_normal();
-    }
+    used.add(rows.leftCols(n), stretch.normal);
     stretch.score += of_turn;
     stretch.is_used = true;
   }

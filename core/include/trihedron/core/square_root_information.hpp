@@ -120,33 +120,38 @@ class SquareRootInformation {
 
   /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.
   void propagate(const DynamicMatrix& A_inverse, const DynamicByConstants& B, const DynamicVector& noise) {
-    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − w) put in: columns are w / noise, x_d(after), x_c. Then
-    // w is eliminated.
+    // With x_d(before) = A⁻¹ (x_d(after) − B x_c − w) the first rows are M x_d(after) + (R_c − M B) x_c, M = R_d A⁻¹. Their
+    // noise has the covariance 1 + M Q Mᵀ = U Uᵀ, U upper triangular: times U⁻¹ they are of unit noise again. The
+    // reflections that make U are of these few columns alone.
     const int d = dynamic_;
     const int c = states_ - d;
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic + Max> moved(
-        d, d + states_);
+    DynamicMatrix M(d, d);
+    DynamicMatrix root = DynamicMatrix::Identity(d, d);  // of 1 + M Q Mᵀ, rows and columns from the last to the first
+    DynamicMatrix noises(d, d);
     for (int i = 0; i < d; ++i) {
-      const double* R = root().row(i);
+      const double* R = this->root().row(i);
       for (int j = 0; j < d; ++j) {
         double sum = 0;
         for (int k = i; k < d; ++k) {
           sum += R[k] * A_inverse(k, j);
         }
-        moved(i, d + j) = sum;
-        moved(i, j) = -sum * noise(j);
+        M(i, j) = sum;
+        noises(j, d - 1 - i) = sum * noise(j);
       }
-      double* constants = &moved(i, d) + d;
-      std::copy_n(R + d, c, constants);
-      take_off(&moved(i, d), 1, {B.data(), d, c, c}, constants);
     }
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic + Max> white(
-        d, d + states_);
-    white.setZero();
-    white.leftCols(d).setIdentity();
-    rotate_into(rows_of(white), rows_of(moved), d);
-    for (int i = 0; i < d; ++i) {
-      std::copy_n(&moved(i, d), states_, root().row(i));
+    rotate_into(rows_of(root), rows_of(noises), d);
+    for (int i = d - 1; i >= 0; --i) {
+      double* row = this->root().row(i);
+      int first = 0;
+      while (first < i && M(i, first) == 0) {
+        ++first;
+      }
+      take_off(&M(i, first), 1, {&B(first, 0), d - first, c, c}, row + d);
+      std::copy_n(&M(i, 0), d, row);
+      const double* U = &root(d - 1 - i, d - 1 - i);  // that of row i; to the right of it, d before each other
+      take_off(U - d, -d, {row + states_ + 1, d - 1 - i, states_, states_ + 1}, row);
+      const double by = 1 / *U;
+      std::for_each(row, row + states_, [by](double& its) { its *= by; });
     }
     triangularise({data_.data(), d, states_, states_ + 1}, d);
   }
