@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "model/prior.hpp"
 #include "trihedron/core/forecast.hpp"
 #include "trihedron/core/measurement.hpp"
@@ -247,8 +248,9 @@ PredictedError OpenLoopPrediction::error() const {
     constexpr double kUnknown = std::numeric_limits<double>::infinity();
     return {state_->now, Eigen::Matrix3d::Constant(kUnknown), kUnknown, kUnknown, kUnknown};
   }
-  const auto rows = causes->rows.leftCols(state_->start.covariance.rows());
-  return with_quantiles(state_->now, rows * state_->start.covariance * rows.transpose() + causes->noise());
+  const Eigen::MatrixXd by_cause = causes->rows.leftCols(state_->start.covariance.rows()).transpose();
+  return with_quantiles(state_->now,
+                        by_cause.transpose() * multiply(state_->start.covariance, by_cause) + causes->noise());
 }
 
 std::vector<ErrorCause> OpenLoopPrediction::causes() const {
