@@ -352,9 +352,9 @@ void rotate_into(RowsView root, RowsView extra, int eliminated) {
 void triangularise(RowsView rows, int columns) {
   for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
     const int rest = rows.columns - j;
-    int below = rows.rows - j - 1;
-    while (below > 0 && rows(j + below, j) == 0) {
-      --below;
+    int below = 0;
+    for (int i = 1; i < rows.rows - j; ++i) {
+      below = rows(j + i, j) != 0 ? i : below;
     }
     rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, below, rest, rows.stride}, 1);
   }

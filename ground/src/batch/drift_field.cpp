@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "batch/information_smoother.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/drift_models.hpp"

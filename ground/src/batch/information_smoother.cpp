@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "batch/gram.hpp"
-#include "batch/householder.hpp"
+#include "linear/gram.hpp"
+#include "linear/householder.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/records/stop.hpp"
 

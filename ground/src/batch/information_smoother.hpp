@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 
 namespace trihedron::ground {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <utility>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "model/prior.hpp"
 
 namespace trihedron::ground {

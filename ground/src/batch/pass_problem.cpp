@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "model/scatter.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"

@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "batch/members.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "choose/jumps.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/stop.hpp"

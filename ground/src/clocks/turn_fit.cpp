@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "model/scatter.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/stop.hpp"

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 #include "model/prior.hpp"
 #include "trihedron/core/forecast.hpp"
 #include "trihedron/core/measurement.hpp"

@@ -142,16 +142,14 @@ class SquareRootInformation {
     rotate_into(rows_of(root), rows_of(noises), d);
     for (int i = d - 1; i >= 0; --i) {
       double* row = this->root().row(i);
-      int first = 0;
-      while (first < i && M(i, first) == 0) {
-        ++first;
-      }
-      take_off(&M(i, first), 1, {&B(first, 0), d - first, c, c}, row + d);
-      std::copy_n(&M(i, 0), d, row);
+      const double* its = &M(i, 0);
+      const auto first = static_cast<int>(std::find_if(its, its + i, [](double x) { return x != 0; }) - its);
+      take_off(its + first, 1, {&B(first, 0), d - first, c, c}, row + d);
+      std::copy_n(its, d, row);
       const double* U = &root(d - 1 - i, d - 1 - i);  // that of row i; to the right of it, d before each other
       take_off(U - d, -d, {row + states_ + 1, d - 1 - i, states_, states_ + 1}, row);
       const double by = 1 / *U;
-      std::for_each(row, row + states_, [by](double& its) { its *= by; });
+      std::for_each(row, row + states_, [by](double& x) { x *= by; });
     }
     triangularise({data_.data(), d, states_, states_ + 1}, d);
   }

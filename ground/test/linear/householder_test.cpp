@@ -1,4 +1,4 @@
-#include "batch/householder.hpp"
+#include "linear/householder.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
-#include "batch/householder.hpp"
+#include "linear/householder.hpp"
 
-#include "batch/householder_kernel.hpp"
-#include "batch/vector_instructions.hpp"
+#include "linear/householder_kernel.hpp"
+#include "linear/vector_instructions.hpp"
 
 namespace trihedron::ground {
 namespace {

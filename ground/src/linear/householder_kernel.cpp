@@ -1,7 +1,7 @@
 // Compiled once for each instruction set, with TRIHEDRON_KERNEL the name of a namespace. Eigen goes into one of that
 // name too: functions of one name compiled for different processors must not meet in a program, in which the linker
 // keeps any of them.
-#include "batch/householder_kernel.hpp"
+#include "linear/householder_kernel.hpp"
 
 #include <cmath>
 

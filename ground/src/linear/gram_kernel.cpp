@@ -1,5 +1,5 @@
 // Compiled once for each instruction set, with TRIHEDRON_KERNEL the name of a namespace; as householder_kernel.cpp.
-#include "batch/gram_kernel.hpp"
+#include "linear/gram_kernel.hpp"
 
 #define Eigen TRIHEDRON_KERNEL
 #include <Eigen/Cholesky>

@@ -1,7 +1,7 @@
-#include "batch/gram.hpp"
+#include "linear/gram.hpp"
 
-#include "batch/gram_kernel.hpp"
-#include "batch/vector_instructions.hpp"
+#include "linear/gram_kernel.hpp"
+#include "linear/vector_instructions.hpp"
 
 namespace trihedron::ground {
 namespace {
