@@ -329,6 +329,7 @@ WORLDS = [
 
     World("degrees-5e-8", "drift outside eq. (1)", degrees(5e-8)),
     World("degrees-8e-8", "drift outside eq. (1)", degrees(8e-8)),
+    World("degrees-2e-8-yaw-steered", "drift outside eq. (1)", lambda random: degrees(2e-8)(random) + toml(attitude={"reference": '"yaw-steered"', "slews": '"none"'})),
     World("bump-5e-8", "drift outside eq. (1)", bump(5e-8)),
     World("bump-1e-6", "drift outside eq. (1)", bump(1e-6)),
     World("hysteresis-5e-7", "drift outside eq. (1)", drifting(hysteresis='"5e-7rad/s"')),
@@ -378,6 +379,7 @@ WORLDS = [
     World("gyro-spikes", "faults", constant(SLEWS), spikes(0.01, math.radians(1))),
     World("inertial-step-1deg", "faults", constant(SLEWS), inertial_step(math.radians(1)), faults=("momentum-jumped",)),
     World("aberration", "faults", tracker(aberration='"uncorrected"'), faults=("aberration-not-corrected",)),
+    World("aberration-yaw-steered", "faults", constant(YAW_STEERED + toml(star_tracker={"aberration": '"uncorrected"'})), faults=("orbital-error-or-drift",)),
     World("cosine-scale", "faults", constant(toml(gyro_drift={}, gyro_readout={"scale": "[5e-4, -5e-4, 0]"})), faults=("readout-scale-off",)),
     World("readout-cubic-4", "faults", constant(SLEWS), cubic(4 * ARCSECOND), faults=("readout-error-by-direction",)),
     World("readout-harmonic-1", "faults", constant(SLEWS), harmonic(1 * ARCSECOND, 2), faults=("readout-error-by-direction",)),

@@ -338,6 +338,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.evidence = decision.evidence;
   run.orbital_error_over_drift = decision.orbital_error_over_drift;
   run.orbital_error_over_field = decision.orbital_error_over_field;
+  run.field_or_error = decision.field_or_error;
   run.against_field = decision.against_field;
   run.changes = decision.changes;
   run.known_before = known_before(settings, decision.options, decision.field);

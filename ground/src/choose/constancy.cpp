@@ -836,33 +836,16 @@ Moves moves_over(const Trial& trial) {
   return moves;
 }
 
-OrbitalOdds orbital_odds(const Trial& trial) {
+namespace {
+
+/// Of shapes that are rows · beside() with the states of a trial: what the whole pass says of their sizes, all states
+/// eliminated; information, and right of it its right side.
+template <class Beside>
+MatrixXd information_on_shapes(const Trial& trial, Index shapes, const Beside& beside) {
   const PassProblem& problem = trial.problem();
   const BatchResult& found = trial.found();
-  const CalibrationSetup& setup = problem.setup().on_board;
-  const double rate_rad_s = setup.orbital_rate_rad_s;
-  const int gyros = problem.layout().gyros;
-  constexpr Index kOfOne = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
-  const Index errors = kOfOne * problem.layout().star_trackers;
-  TurnedByOrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
-  const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
-    MatrixXd shapes = MatrixXd::Zero(rows.rows(), errors + kOfOne * gyros);
-    auto error = shapes.middleCols<kOfOne>(kOfOne * moment.fix->fix.head);
-    const double phase = rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
-    const Eigen::Quaterniond q_in_c = moment.fix->fix.q_in_c.normalized();
-    drift.go_to(moment.t, q_in_c);
-    const Eigen::Matrix<double, 3, kOfOne> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
-    for (int k = 0; k < gyros; ++k) {
-      const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
-      error.leftCols<3>() += std::sin(phase) * by_alignment;
-      error.rightCols<3>() += std::cos(phase) * by_alignment;
-      shapes.middleCols<kOfOne>(errors + kOfOne * k) = by_alignment.lazyProduct(turned_c);
-    }
-    return shapes;
-  };
   const Index d = problem.layout().dynamic();
   const Index constants = problem.layout().size() - d;
-  const Index shapes = errors + kOfOne * gyros;
   Stretch whole(d, constants, shapes);
   whole.measure(prior_rows(found.linear, shapes));
   problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
@@ -871,21 +854,82 @@ OrbitalOdds orbital_odds(const Trial& trial) {
       whole.move(found.linear.stages[arc], MatrixXd(d, 0));
     }
   });
-  const MatrixXd form = without_first(without_states_at_end(whole.form(true), d), d + constants);
-  const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
-  const auto log_odds = [](const MatrixXd& its, Index at, Index size, double sigma) {
-    return log_evidence_of(sigma * sigma * its.block(at, at, size, size),
-                           sigma * its.col(its.cols() - 1).segment(at, size));
-  };
+  return without_first(without_states_at_end(whole.form(true), d), d + constants);
+}
+
+/// Of so many of these shapes from one on, of this 1-sigma each.
+LogEvidence evidence_of_shapes(const MatrixXd& information, Index at, Index size, double sigma) {
+  return log_evidence_of(sigma * sigma * information.block(at, at, size, size),
+                         sigma * information.col(information.cols() - 1).segment(at, size));
+}
+
+/// An error of the star tracker at an angle's sine and cosine, six columns about c x, y, z: as alignments of all gyros.
+void add_error_at(double angle, const MatrixXd& rows, const Layout& layout, Eigen::Ref<MatrixXd> error) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+    error.leftCols<3>() += std::sin(angle) * by_alignment;
+    error.rightCols<3>() += std::cos(angle) * by_alignment;
+  }
+}
+
+}  // namespace
+
+OrbitalOdds orbital_odds(const Trial& trial) {
+  const PassProblem& problem = trial.problem();
+  const CalibrationSetup& setup = problem.setup().on_board;
+  const double rate_rad_s = setup.orbital_rate_rad_s;
+  const int gyros = problem.layout().gyros;
+  constexpr Index kOfOne = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
+  const Index errors = kOfOne * problem.layout().star_trackers;
   const Index drifts = kOfOne * gyros;
+  TurnedByOrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
+  const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
+    MatrixXd shapes = MatrixXd::Zero(rows.rows(), errors + drifts);
+    const double phase = rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+    add_error_at(phase, rows, layout, shapes.middleCols<kOfOne>(kOfOne * moment.fix->fix.head));
+    const Eigen::Quaterniond q_in_c = moment.fix->fix.q_in_c.normalized();
+    drift.go_to(moment.t, q_in_c);
+    const Eigen::Matrix<double, 3, kOfOne> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
+    for (int k = 0; k < gyros; ++k) {
+      const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+      shapes.middleCols<kOfOne>(errors + kOfOne * k) = by_alignment.lazyProduct(turned_c);
+    }
+    return shapes;
+  };
+  const MatrixXd form = information_on_shapes(trial, errors + drifts, beside);
+  const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
   const double drift_rad_s = std::abs(rate_rad_s) * error_rad;
-  const LogEvidence error = log_odds(form, 0, errors, error_rad);
+  const LogEvidence error = evidence_of_shapes(form, 0, errors, error_rad);
   MatrixXd with_prior = form;
   with_prior.diagonal().head(errors).array() += 1 / (error_rad * error_rad);
-  const LogEvidence beside_error = log_odds(without_first(with_prior, errors), 0, drifts, drift_rad_s);
+  const LogEvidence beside_error = evidence_of_shapes(without_first(with_prior, errors), 0, drifts, drift_rad_s);
   return {error,
-          log_odds(form, errors, drifts, drift_rad_s),
+          evidence_of_shapes(form, errors, drifts, drift_rad_s),
           {error.by_prior_as_it_is + beside_error.value, error.by_prior_as_it_is + beside_error.by_prior_as_it_is}};
+}
+
+double odds_of_error_with_orbit(const Trial& trial) {
+  constexpr int kHarmonics = 6;
+  constexpr Index kOfOne = 6;
+  const PassProblem& problem = trial.problem();
+  const CalibrationSetup& setup = problem.setup().on_board;
+  const Index of_all = kOfOne * problem.layout().star_trackers;
+  const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
+    MatrixXd errors = MatrixXd::Zero(rows.rows(), of_all * kHarmonics);
+    const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+    for (int i = 0; i < kHarmonics; ++i) {
+      add_error_at((i + 1) * phase, rows, layout,
+                   errors.middleCols<kOfOne>(of_all * i + kOfOne * moment.fix->fix.head));
+    }
+    return errors;
+  };
+  const MatrixXd information = information_on_shapes(trial, of_all * kHarmonics, beside);
+  const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
+  double best = -std::numeric_limits<double>::infinity();
+  for (int harmonics = 1; harmonics <= kHarmonics; ++harmonics) {
+    best = std::max(best, evidence_of_shapes(information, 0, of_all * harmonics, error_rad).value);
+  }
+  return best - std::log(kHarmonics);
 }
 
 }  // namespace trihedron::ground

@@ -709,20 +709,54 @@ bool is_all_that_is_left(const Decision& by_drift) {
   return std::max(walk_rad_s, wanders ? options.further_states.wandering_drift_rad_s : 0) < kMost * drift_rad_s;
 }
 
-/// By eq. (1) in place of a field, with the least noise: the field, and noise, have taken a part of what comes back.
+/// Eq. (1) in place of a field, with the least noise: the field, and noise, have taken a part of what comes back.
+CalibrationOptions by_eq1(const CalibrationOptions& asked, CalibrationOptions with_field) {
+  with_field.drift_field = false;
+  with_field.drift_model = kEsg7;
+  with_field.direction_random_walk_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
+  with_field.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
+  return with_field;
+}
+
 struct ByEq1InsteadOfField {
   double log_likelihood;
-  OrbitalOdds odds;  ///< where the error was found it is there, and those of drift are beside it
+  OrbitalOdds odds;         ///< where the error was found it is there, and those of drift are beside it
+  double error_with_orbit;  ///< ln of the odds of one of any shape
 };
 
-ByEq1InsteadOfField by_eq1_instead_of_field(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                                            CalibrationOptions options) {
-  options.drift_field = false;
-  options.drift_model = kEsg7;
-  options.direction_random_walk_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
-  options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
-  const Trial trial(pass, screened, options);
-  return {trial.log_likelihood(), orbital_odds(trial)};
+/// Where a decision has a field.
+std::optional<ByEq1InsteadOfField> by_eq1_instead_of_field(const Pass& pass, const Screened& screened,
+                                                           const CalibrationOptions& asked, const Decision& decision) {
+  if (!decision.field || !(decision.field->log_evidence > kLogOddsToAccept)) {
+    return std::nullopt;
+  }
+  const Trial trial(pass, screened, by_eq1(asked, decision.options));
+  return ByEq1InsteadOfField{trial.log_likelihood(), orbital_odds(trial), odds_of_error_with_orbit(trial)};
+}
+
+/// ln of the odds of the field of a decision, of each gyro for itself, against none by what no error of the star tracker
+/// moves, the angle between the momenta: fixes of a hundred times their noise say next to nothing of the attitude.
+double field_by_angle(const Pass& pass, const Screened& screened, const Decision& decision) {
+  constexpr double kBlind = 100;
+  CalibrationOptions options = decision.options;
+  options.star_tracker_noise_rad =
+      kBlind * options.star_tracker_noise_rad.value_or(pass.settings.star_tracker_noise_rad);
+  return Trial(pass, screened, options).log_odds_of_field(decision.field->sigma_rad_s);
+}
+
+/// Where a good part of what a field explains is explained by an error of the star tracker as well.
+std::optional<FieldOrError> field_or_error(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                                           const Decision& decision,
+                                           const std::optional<ByEq1InsteadOfField>& instead) {
+  constexpr double kGoodPart = 0.3;
+  if (!instead || asked.further_states[FurtherState::kOrbitalError] == Choice::kOff) {
+    return std::nullopt;
+  }
+  const double by_field = decision.log_likelihood - instead->log_likelihood;
+  if (instead->error_with_orbit < kGoodPart * by_field) {
+    return std::nullopt;
+  }
+  return FieldOrError{by_field, instead->error_with_orbit, field_by_angle(pass, screened, decision)};
 }
 
 /// What the odds say of an error of the star tracker and of drift at orbital period.
@@ -835,10 +869,8 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
   if (!decision.orbital_odds) {
     return decision;
   }
-  std::optional<ByEq1InsteadOfField> instead;
-  if (decision.field && decision.field->log_evidence > kLogOddsToAccept) {
-    instead = by_eq1_instead_of_field(pass, screened, asked, decision.options);
-  }
+  const auto instead = by_eq1_instead_of_field(pass, screened, asked, decision);
+  decision.field_or_error = field_or_error(pass, screened, asked, decision, instead);
   const AtOrbit at_orbit(decision, instead);
   if (asked.further_states[kError] == Choice::kAuto) {
     decision.orbital_error_over_field = at_orbit.error_over_field();
@@ -886,6 +918,8 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
   Decision without = decide_by_pass(pass, screened, without_error, largest_model, progress);
   without.evidence.push_back({kError, at_orbit.error_over_drift(), false});
   without.orbital_error_over_drift = at_orbit.error_over_drift();
+  without.field_or_error =
+      field_or_error(pass, screened, asked, without, by_eq1_instead_of_field(pass, screened, asked, without));
   asked = without_error;
   return without_aberration(std::move(without));
 }
@@ -896,6 +930,7 @@ void keep_what_comes_back(const Decision& before, Decision& again) {
                        [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
   again.orbital_error_over_drift = before.orbital_error_over_drift;
   again.orbital_error_over_field = before.orbital_error_over_field;
+  again.field_or_error = before.field_or_error;
 }
 
 /// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:

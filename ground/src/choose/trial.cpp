@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "linear/gram.hpp"
 #include "batch/pass_setup.hpp"
 #include "model/setup.hpp"
 
@@ -202,6 +203,16 @@ std::optional<FieldPrior> Trial::field_prior() const {
   const FieldInformation information = field_information(found_.linear, problem_.setup().noise());
   return ground::field_prior(problem_, *field_, information,
                              most_likely_spectrum(*field_, information, spectrum_.log_rms));
+}
+
+double Trial::log_odds_of_field(const Eigen::VectorXd& sigma_rad_s) const {
+  const FieldInformation information = field_information(found_.linear, problem_.setup().noise());
+  const Eigen::MatrixXd shown = information.R * sigma_rad_s.asDiagonal();
+  Eigen::MatrixXd covariance = square(shown);
+  covariance.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  const double log_root = root.matrixLLT().diagonal().array().log().sum();
+  return (information.y.squaredNorm() - root.matrixL().solve(information.y).squaredNorm()) / 2 - log_root;
 }
 
 Trial::InPriorSigmas Trial::in_prior_sigmas(FurtherState state, const std::vector<FurtherState>& zero) const {

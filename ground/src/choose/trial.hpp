@@ -66,6 +66,9 @@ class Trial {
 
   /// Prior of the drift field, where the drift is one.
   [[nodiscard]] std::optional<FieldPrior> field_prior() const;
+  /// Where the drift is one: ln of the odds against no such drift of a field of the gyros, each for itself, whose
+  /// members have these 1-sigmas, rad/s.
+  [[nodiscard]] double log_odds_of_field(const Eigen::VectorXd& sigma_rad_s) const;
   /// All coefficients and alignments as the trial finds them, with the uncertainty that the spectrum of a field adds.
   [[nodiscard]] Calibration calibration(const FieldPrior& field) const {
     return calibration_of(problem_, kappa_and_delta(problem_, found_, field.more_covariance));

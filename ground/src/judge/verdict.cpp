@@ -610,17 +610,36 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
   }
 }
 
-void judge_field_or_error(const std::optional<double>& error_over_field, std::vector<Finding>& findings) {
-  if (!error_over_field || *error_over_field < -kSureOfOrbit) {
+void judge_field_or_error(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const std::optional<double>& error_over_field = run.orbital_error_over_field;
+  const std::optional<FieldOrError>& either = run.field_or_error;
+  std::vector<std::string> evidence;
+  bool is_warning = true;
+  if (error_over_field && *error_over_field > -kSureOfOrbit) {
+    is_warning = false;
+    evidence.push_back(
+        fmt::format("ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}",
+                    *error_over_field));
+  }
+  if (either && either->field_by_angle < kSureOfOrbit) {
+    is_warning = is_warning && either->field_by_angle > -kSureOfOrbit;
+    evidence.push_back(
+        fmt::format("ln of the odds of the drift {:+.1f}, of such an error {:+.1f}; of drift as large by the angle "
+                    "between the momenta, which the gyros read without the star tracker, {:+.1f}",
+                    either->field, either->error, either->field_by_angle));
+  }
+  if (evidence.empty()) {
     return;
   }
-  add(findings, FindingCode::kOrbitalErrorOrDrift,
-      "What was taken for drift that eq. (1) does not contain may as well be an error of the star tracker at orbital "
-      "period: in this pass both look alike. Sigmas do not tell of the error.",
-      fmt::format("ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}",
-                  *error_over_field),
-      "Calibrate by a longer pass, with more fixes and with slews about two axes. Where the star tracker is known to "
-      "have no such error: orbital_error = \"off\" in [further_states].");
+  findings.push_back(
+      {FindingCode::kOrbitalErrorOrDrift,
+       "What was taken for drift that eq. (1) does not contain may as well be an error of the star tracker that comes "
+       "back with the orbit: in this pass both look alike. Sigmas do not tell of the error.",
+       fmt::format("{}", fmt::join(evidence, "; ")),
+       "Look whether aberration is corrected, whether heads take turns, whether the mounting bends with the Sun. "
+       "Calibrate by a longer pass, with more fixes and with slews about two axes. Where the star tracker is known to "
+       "have no error at orbital period: orbital_error = \"off\" in [further_states].",
+       is_warning ? Finding::Severity::kWarning : Finding::Severity::kDoNotUse});
 }
 
 void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -1091,7 +1110,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_clocks(pass, run, findings);
   judge_at_orbital_period(kErrorAtOrbitalPeriod, run, findings);
   judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
-  judge_field_or_error(run.orbital_error_over_field, findings);
+  judge_field_or_error(run, findings);
   judge_polhodes(run, findings);
   judge_beside_outages(run.beside_outages, findings);
   judge_determination(run, findings);

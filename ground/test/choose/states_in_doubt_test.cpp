@@ -85,7 +85,7 @@ TEST(Trial, TellsTheSigmaOfAStateAsAFitWithItAloneDoes) {
 
 TEST(StatesInDoubt, AreToldWhereAFlightWithoutSlewsLeavesThemOpen) {
   Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
-  scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+  scenario.attitude.reference = AttitudeScenario::AttitudeScenario::Reference::kYawSteered;
   const CalibrationRun slewing = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
   scenario.attitude.slews = std::vector<Slew>{};
   const Pass steady = sim::simulate(scenario).pass;
@@ -178,6 +178,47 @@ TEST(DriftModelTold, IsNotToBeUsedWhereThePassHasDriftThatItDoesNotContain) {
       EXPECT_EQ(run.calibration.verdict.has(FindingCode::kDriftModelTooSmall), outside);
     }
   }
+}
+
+// ---- A drift field or an error of the star tracker
+
+/// Steered in yaw without slews, so that the same directions come back with each orbit.
+Scenario steered_in_yaw() {
+  Scenario scenario = scenario_in_eq1(3, std::chrono::hours(5));
+  scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+  scenario.attitude.slews = std::vector<Slew>{};
+  return scenario;
+}
+
+TEST(FieldOrError, IsNotTrustedWhereDriftWouldMoveTheAngleBetweenTheMomenta) {
+  Pass pass = sim::simulate(steered_in_yaw()).pass;
+  const double rate_rad_s = 2 * std::numbers::pi / 5600;
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    const double angle = 2 * rate_rad_s * to_seconds(pass.star_tracker.t[i] - pass.settings.epoch);
+    const Eigen::Vector3d error = 15 * kArcsecond * Eigen::Vector3d(std::sin(angle), std::cos(angle), std::sin(angle));
+    pass.star_tracker.q_in_c[i] = pass.star_tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+  }
+  const CalibrationRun run = calibrate(pass, CalibrationOptions());
+  ASSERT_TRUE(run.field_or_error);
+  EXPECT_GT(run.field_or_error->error, 0.7 * run.field_or_error->field);
+  EXPECT_LT(run.field_or_error->field_by_angle, -5);
+  EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+  // Somebody may know that the star tracker has none.
+  CalibrationOptions known;
+  known.further_states[FurtherState::kOrbitalError] = Choice::kOff;
+  EXPECT_FALSE(calibrate(pass, known).field_or_error);
+}
+
+TEST(FieldOrError, IsDriftWhereTheAngleShowsIt) {
+  Scenario scenario = steered_in_yaw();
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 5e-8;
+  }
+  const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+  ASSERT_TRUE(run.field_or_error);
+  EXPECT_GT(run.field_or_error->field_by_angle, 5);
+  EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
 }
 
 }  // namespace

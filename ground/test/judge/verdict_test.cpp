@@ -221,6 +221,23 @@ TEST(Verdict, ForbidsDriftOutsideEq1ThatMayBeAnErrorOfTheStarTracker) {
   EXPECT_THAT(found.findings[0].evidence, HasSubstr("-3.0"));
 }
 
+TEST(Verdict, ForbidsDriftOutsideEq1ThatWouldMoveTheAngleBetweenTheMomenta) {
+  auto run = good_run();
+  run.field_or_error = {.field = 300, .error = 250, .field_by_angle = 20};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.field_or_error->field_by_angle = -1;  // it does not say
+  const Verdict open = judge(good_pass(), run);
+  ASSERT_THAT(codes(open), ElementsAre("orbital-error-or-drift"));
+  EXPECT_TRUE(open.trustworthy);
+  run.field_or_error->field_by_angle = -7;
+  const Verdict found = judge(good_pass(), run);
+  ASSERT_THAT(codes(found), ElementsAre("orbital-error-or-drift"));
+  EXPECT_FALSE(found.trustworthy);
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("+300.0"));
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("+250.0"));
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("-7.0"));
+}
+
 TEST(Verdict, TellsOfPolhodesAndOfPeriodsThatMayBeThoseOfTheOrbit) {
   auto run = good_run();
   run.options.orbital_rate_rad_s = 2 * std::numbers::pi / 6000;

@@ -179,6 +179,15 @@ struct AgainstField {
   std::vector<FurtherState> instead;  ///< found beside eq. (1), and not beside the field
 };
 
+/// A drift field that may be an error of the star tracker which comes back with the orbit: ln of odds against eq. (1)
+/// alone without either.
+struct FieldOrError {
+  double field = 0;
+  double error = 0;
+  /// Of a field as large by the angle between the momenta, which no error of the star tracker moves.
+  double field_by_angle = 0;
+};
+
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                         ///< as decided
@@ -194,6 +203,7 @@ struct CalibrationRun {
   std::optional<double> orbital_error_over_drift;
   /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
   std::optional<double> orbital_error_over_field;
+  std::optional<FieldOrError> field_or_error;    ///< where a drift field was found that may be one
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   std::optional<AgainstField> against_field;     ///< where eq. (1) alone was asked for
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
