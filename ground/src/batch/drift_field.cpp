@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "linear/gram.hpp"
 #include "batch/information_smoother.hpp"
+#include "linear/gram.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/drift_models.hpp"
 #include "trihedron/records/stop.hpp"

@@ -7,10 +7,10 @@
 #include <map>
 #include <utility>
 
-#include "linear/gram.hpp"
 #include "batch/members.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"
+#include "linear/gram.hpp"
 #include "model/open_loop_start.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"

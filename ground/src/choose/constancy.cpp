@@ -10,8 +10,8 @@
 #include <optional>
 #include <utility>
 
-#include "linear/gram.hpp"
 #include "choose/jumps.hpp"
+#include "linear/gram.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/stop.hpp"
 #include "trihedron/records/units.hpp"

@@ -734,8 +734,9 @@ std::optional<ByEq1InsteadOfField> by_eq1_instead_of_field(const Pass& pass, con
   return ByEq1InsteadOfField{trial.log_likelihood(), orbital_odds(trial), odds_of_error_with_orbit(trial)};
 }
 
-/// ln of the odds of the field of a decision, of each gyro for itself, against none by what no error of the star tracker
-/// moves, the angle between the momenta: fixes of a hundred times their noise say next to nothing of the attitude.
+/// ln of the odds of the field of a decision, of each gyro for itself, against none by what no error of the star
+/// tracker moves, the angle between the momenta: fixes of a hundred times their noise say next to nothing of the
+/// attitude.
 double field_by_angle(const Pass& pass, const Screened& screened, const Decision& decision) {
   constexpr double kBlind = 100;
   CalibrationOptions options = decision.options;

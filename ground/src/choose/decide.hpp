@@ -36,7 +36,7 @@ struct Decision {
   /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
   std::optional<double> orbital_error_over_field;
   std::optional<FieldOrError> field_or_error;  ///< where a drift field may be an error of the star tracker
-  std::optional<AgainstField> against_field;  ///< where eq. (1) alone was asked for, and the noise was found
+  std::optional<AgainstField> against_field;   ///< where eq. (1) alone was asked for, and the noise was found
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
   std::optional<Calibration> members;   ///< all coefficients of the field as the trial finds them, and alignments

@@ -11,8 +11,8 @@
 #include <optional>
 #include <utility>
 
-#include "linear/gram.hpp"
 #include "batch/pass_setup.hpp"
+#include "linear/gram.hpp"
 #include "model/setup.hpp"
 
 namespace trihedron::ground {

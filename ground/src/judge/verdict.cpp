@@ -617,9 +617,8 @@ void judge_field_or_error(const CalibrationRun& run, std::vector<Finding>& findi
   bool is_warning = true;
   if (error_over_field && *error_over_field > -kSureOfOrbit) {
     is_warning = false;
-    evidence.push_back(
-        fmt::format("ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}",
-                    *error_over_field));
+    evidence.push_back(fmt::format(
+        "ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}", *error_over_field));
   }
   if (either && either->field_by_angle < kSureOfOrbit) {
     is_warning = is_warning && either->field_by_angle > -kSureOfOrbit;

@@ -120,8 +120,8 @@ class SquareRootInformation {
 
   /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.
   void propagate(const DynamicMatrix& A_inverse, const DynamicByConstants& B, const DynamicVector& noise) {
-    // With x_d(before) = A⁻¹ (x_d(after) − B x_c − w) the first rows are M x_d(after) + (R_c − M B) x_c, M = R_d A⁻¹. Their
-    // noise has the covariance 1 + M Q Mᵀ = U Uᵀ, U upper triangular: times U⁻¹ they are of unit noise again. The
+    // With x_d(before) = A⁻¹ (x_d(after) − B x_c − w) the first rows are M x_d(after) + (R_c − M B) x_c, M = R_d A⁻¹.
+    // Their noise has the covariance 1 + M Q Mᵀ = U Uᵀ, U upper triangular: times U⁻¹ they are of unit noise again. The
     // reflections that make U are of these few columns alone.
     const int d = dynamic_;
     const int c = states_ - d;
