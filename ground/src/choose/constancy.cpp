@@ -155,6 +155,30 @@ Matrix3d cross(const Vector3d& v) {
   return m;
 }
 
+/// Adds the shapes of aberration to those of a fix: by a velocity that is constant, and by two at orbital period, over
+/// the speed of light, in axes.
+void add_aberration(const PassProblem::Moment& moment, double phase, const MatrixXd& rows, const Layout& layout,
+                    Eigen::Ref<MatrixXd> shapes) {
+  const Matrix3d aberrated =
+      cross(Vector3d::UnitZ()) * moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
+  for (int k = 0; k < layout.gyros; ++k) {
+    const Eigen::Matrix<double, Eigen::Dynamic, 3> by_velocity =
+        rows.middleCols<3>(layout.alignment(k)).lazyProduct(aberrated);
+    shapes.middleCols<3>(0) += by_velocity;
+    shapes.middleCols<3>(3) += std::cos(phase) * by_velocity;
+    shapes.middleCols<3>(6) += std::sin(phase) * by_velocity;
+  }
+}
+
+/// What may be expected of these, 1-sigma: the Earth's orbital velocity over that of light, and a spacecraft's.
+VectorXd sigmas_of_aberration() {
+  constexpr double kAnnual = 6e-5;
+  constexpr double kOrbital = 1.5e-5;
+  VectorXd sigmas = VectorXd::Constant(kOfAberration, kOrbital);
+  sigmas.head<3>().setConstant(kAnnual);
+  return sigmas;
+}
+
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
 /// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
@@ -164,16 +188,13 @@ Matrix3d cross(const Vector3d& v) {
 MatrixXd shapes_of(const CalibrationSetup& setup, const DriftModel& model_of_fields, const PassProblem::Moment& moment,
                    const Layout& layout, const MatrixXd& rows, Index more) {
   MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros + more);
-  const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
-  const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+  if (moment.fix->fix.head == 0) {
+    add_aberration(moment, phase, rows, layout, shapes.leftCols<kOfAberration>());
+  }
   for (int k = 0; k < layout.gyros; ++k) {
     const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
     if (moment.fix->fix.head == 0) {
-      const Eigen::Matrix<double, Eigen::Dynamic, 3> by_velocity = by_alignment.lazyProduct(aberrated);
-      shapes.middleCols<3>(0) += by_velocity;
-      shapes.middleCols<3>(3) += std::cos(phase) * by_velocity;
-      shapes.middleCols<3>(6) += std::sin(phase) * by_velocity;
       for (int i = 0; i < kMultiplesOfRate; ++i) {
         const Index at = kOfAberration + Index{kOfMultiple} * i;
         shapes.middleCols<3>(at) += std::sin((i + 2) * phase) * by_alignment;
@@ -612,8 +633,6 @@ Moves moves_over(const Trial& trial) {
   constexpr double kCreeps_rad = 5 * kArcsecond;
   constexpr double kPartOfCoefficients = 0.1;
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
-  constexpr double kAnnual = 6e-5;
-  constexpr double kOrbital = 1.5e-5;
   constexpr double kScales[] = {1e-3, 1e-4, 2e-5, 5e-6};
   constexpr double kFieldLarge_rad = 5 * kArcsecond;
   constexpr double kFieldSmall_rad = kArcsecond;
@@ -750,9 +769,8 @@ Moves moves_over(const Trial& trial) {
     }
     return entries;
   };
-  VectorXd velocity = sigmas(kOfAberration, kOrbital);
-  velocity.head<3>().setConstant(kAnnual);
-  consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
+  consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration),
+           sigmas_of_aberration());
   for (int i = 0; i < kMultiplesOfRate; ++i) {
     consider(what(Moving::kStarTracker, Motion::kFaster, -1), shape(pass.multiple(i), kOfMultiple),
              sigmas(kOfMultiple, kCreeps_rad));
@@ -857,10 +875,11 @@ MatrixXd information_on_shapes(const Trial& trial, Index shapes, const Beside& b
   return without_first(without_states_at_end(whole.form(true), d), d + constants);
 }
 
-/// Of so many of these shapes from one on, of this 1-sigma each.
-LogEvidence evidence_of_shapes(const MatrixXd& information, Index at, Index size, double sigma) {
-  return log_evidence_of(sigma * sigma * information.block(at, at, size, size),
-                         sigma * information.col(information.cols() - 1).segment(at, size));
+/// Of these shapes from one on, with these 1-sigmas.
+LogEvidence evidence_of_shapes(const MatrixXd& information, Index at, const VectorXd& sigma) {
+  const Index size = sigma.size();
+  return log_evidence_of(sigma.asDiagonal() * information.block(at, at, size, size) * sigma.asDiagonal(),
+                         sigma.cwiseProduct(information.col(information.cols() - 1).segment(at, size)));
 }
 
 /// An error of the star tracker at an angle's sine and cosine, six columns about c x, y, z: as alignments of all gyros.
@@ -899,37 +918,43 @@ OrbitalOdds orbital_odds(const Trial& trial) {
   const MatrixXd form = information_on_shapes(trial, errors + drifts, beside);
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
   const double drift_rad_s = std::abs(rate_rad_s) * error_rad;
-  const LogEvidence error = evidence_of_shapes(form, 0, errors, error_rad);
+  const LogEvidence error = evidence_of_shapes(form, 0, VectorXd::Constant(errors, error_rad));
   MatrixXd with_prior = form;
   with_prior.diagonal().head(errors).array() += 1 / (error_rad * error_rad);
-  const LogEvidence beside_error = evidence_of_shapes(without_first(with_prior, errors), 0, drifts, drift_rad_s);
+  const LogEvidence beside_error =
+      evidence_of_shapes(without_first(with_prior, errors), 0, VectorXd::Constant(drifts, drift_rad_s));
   return {error,
-          evidence_of_shapes(form, errors, drifts, drift_rad_s),
+          evidence_of_shapes(form, errors, VectorXd::Constant(drifts, drift_rad_s)),
           {error.by_prior_as_it_is + beside_error.value, error.by_prior_as_it_is + beside_error.by_prior_as_it_is}};
 }
 
-double odds_of_error_with_orbit(const Trial& trial) {
+OddsOfErrors odds_of_errors(const Trial& trial) {
   constexpr int kHarmonics = 6;
   constexpr Index kOfOne = 6;
   const PassProblem& problem = trial.problem();
   const CalibrationSetup& setup = problem.setup().on_board;
   const Index of_all = kOfOne * problem.layout().star_trackers;
+  const Index harmonics = of_all * kHarmonics;
   const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
-    MatrixXd errors = MatrixXd::Zero(rows.rows(), of_all * kHarmonics);
+    MatrixXd errors = MatrixXd::Zero(rows.rows(), harmonics + kOfAberration);
     const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
     for (int i = 0; i < kHarmonics; ++i) {
       add_error_at((i + 1) * phase, rows, layout,
                    errors.middleCols<kOfOne>(of_all * i + kOfOne * moment.fix->fix.head));
     }
+    if (moment.fix->fix.head == 0) {
+      add_aberration(moment, phase, rows, layout, errors.rightCols<kOfAberration>());
+    }
     return errors;
   };
-  const MatrixXd information = information_on_shapes(trial, of_all * kHarmonics, beside);
+  const MatrixXd information = information_on_shapes(trial, harmonics + kOfAberration, beside);
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
-  double best = -std::numeric_limits<double>::infinity();
-  for (int harmonics = 1; harmonics <= kHarmonics; ++harmonics) {
-    best = std::max(best, evidence_of_shapes(information, 0, of_all * harmonics, error_rad).value);
+  double with_orbit = -std::numeric_limits<double>::infinity();
+  for (int count = 1; count <= kHarmonics; ++count) {
+    const VectorXd sigma = VectorXd::Constant(of_all * count, error_rad);
+    with_orbit = std::max(with_orbit, evidence_of_shapes(information, 0, sigma).value);
   }
-  return best - std::log(kHarmonics);
+  return {with_orbit - std::log(kHarmonics), evidence_of_shapes(information, harmonics, sigmas_of_aberration()).value};
 }
 
 }  // namespace trihedron::ground

@@ -46,8 +46,14 @@ struct OrbitalOdds {
 /// Of a trial with neither, with the noise and the spectrum of the drift field that were found by it.
 [[nodiscard]] OrbitalOdds orbital_odds(const Trial& trial);
 
-/// ln of the odds, against none, of an error of the star tracker that comes back with the orbit, whatever its shape: of
-/// as many of its first harmonics as make the pass likeliest, six at most. Of a trial with eq. (1).
-[[nodiscard]] double odds_of_error_with_orbit(const Trial& trial);
+/// ln of the odds, against none, of errors of the star tracker.
+struct OddsOfErrors {
+  /// That comes back with the orbit, whatever its shape: as many of its first harmonics as make the pass likeliest, six
+  /// at most.
+  double with_orbit;
+  double aberration;  ///< that is not corrected
+};
+/// By a trial with eq. (1).
+[[nodiscard]] OddsOfErrors odds_of_errors(const Trial& trial);
 
 }  // namespace trihedron::ground

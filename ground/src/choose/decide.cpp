@@ -720,8 +720,8 @@ CalibrationOptions by_eq1(const CalibrationOptions& asked, CalibrationOptions wi
 
 struct ByEq1InsteadOfField {
   double log_likelihood;
-  OrbitalOdds odds;         ///< where the error was found it is there, and those of drift are beside it
-  double error_with_orbit;  ///< ln of the odds of one of any shape
+  OrbitalOdds odds;  ///< where the error was found it is there, and those of drift are beside it
+  OddsOfErrors of_errors;
 };
 
 /// Where a decision has a field.
@@ -731,7 +731,7 @@ std::optional<ByEq1InsteadOfField> by_eq1_instead_of_field(const Pass& pass, con
     return std::nullopt;
   }
   const Trial trial(pass, screened, by_eq1(asked, decision.options));
-  return ByEq1InsteadOfField{trial.log_likelihood(), orbital_odds(trial), odds_of_error_with_orbit(trial)};
+  return ByEq1InsteadOfField{trial.log_likelihood(), orbital_odds(trial), odds_of_errors(trial)};
 }
 
 /// ln of the odds of the field of a decision, of each gyro for itself, against none by what no error of the star
@@ -754,10 +754,10 @@ std::optional<FieldOrError> field_or_error(const Pass& pass, const Screened& scr
     return std::nullopt;
   }
   const double by_field = decision.log_likelihood - instead->log_likelihood;
-  if (instead->error_with_orbit < kGoodPart * by_field) {
+  if (instead->of_errors.with_orbit < kGoodPart * by_field) {
     return std::nullopt;
   }
-  return FieldOrError{by_field, instead->error_with_orbit, field_by_angle(pass, screened, decision)};
+  return FieldOrError{by_field, instead->of_errors.with_orbit, field_by_angle(pass, screened, decision)};
 }
 
 /// What the odds say of an error of the star tracker and of drift at orbital period.
@@ -779,15 +779,17 @@ class AtOrbit {
     if (!has_error_) {
       drift_odds_ = instead->odds.drift;
       drift_over_field_ = less + log_odds(drift_odds_);
-      if (const double error_odds = log_odds(instead->odds.error); error_odds > kLogOddsToAccept) {
-        error_over_field_ = less + error_odds;
-      }
+    }
+    const double aberration = instead->of_errors.aberration;
+    if (const double error_odds = has_error_ ? aberration : std::max(log_odds(instead->odds.error), aberration);
+        error_odds > kLogOddsToAccept) {
+      error_over_field_ = less + error_odds;
     }
   }
 
   [[nodiscard]] bool has_error() const { return has_error_; }
-  /// Where a field was found without an error of the star tracker, and eq. (1) alone would show one: ln of the
-  /// likelihood by eq. (1) with the error less that of the field.
+  /// Where a field was found, and eq. (1) alone would show an error of the star tracker in its place, at orbital period
+  /// or by aberration: ln of the likelihood by eq. (1) with the error less that of the field.
   [[nodiscard]] std::optional<double> error_over_field() const { return error_over_field_; }
   [[nodiscard]] double error_over_drift() const { return log_odds(odds_.error) - log_odds(odds_.drift); }
   [[nodiscard]] bool may_be_drift() const {

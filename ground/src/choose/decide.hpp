@@ -33,7 +33,8 @@ struct Decision {
   std::optional<OrbitalOdds> orbital_odds;  ///< where the pass was looked at for them
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
-  /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
+  /// Where a drift field was found, and eq. (1) alone would show such an error, or aberration, in its place: ln of its
+  /// odds against the field.
   std::optional<double> orbital_error_over_field;
   std::optional<FieldOrError> field_or_error;  ///< where a drift field may be an error of the star tracker
   std::optional<AgainstField> against_field;   ///< where eq. (1) alone was asked for, and the noise was found

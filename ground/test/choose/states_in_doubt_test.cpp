@@ -221,5 +221,31 @@ TEST(FieldOrError, IsDriftWhereTheAngleShowsIt) {
   EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
 }
 
+/// Turns about its vertical so that its panels follow the Sun, 25° out of the plane of the orbit.
+std::vector<AttitudeSample> turned_to_the_sun(double until_s) {
+  constexpr double kSun_rad = 25 * kDegree;
+  std::vector<AttitudeSample> samples;
+  for (double t_s = -60; samples.empty() || samples.back().t_s < until_s + 60; t_s += 10) {
+    const double u = 2 * std::numbers::pi / 5600 * t_s;
+    Eigen::Matrix3d C_in_orbit;
+    C_in_orbit << -std::sin(u), 0, std::cos(u), std::cos(u), 0, std::sin(u), 0, 1, 0;
+    const Eigen::AngleAxisd yaw(std::atan2(std::tan(kSun_rad), std::sin(u)), Eigen::Vector3d::UnitZ());
+    samples.push_back({t_s, Eigen::Quaterniond(C_in_orbit * yaw)});
+  }
+  return samples;
+}
+
+TEST(FieldOrError, IsAberrationWhereThatMakesThePassAsLikely) {
+  Scenario scenario = scenario_in_eq1(3, std::chrono::hours(9));
+  scenario.attitude.reference = AttitudeScenario::Reference::kRecorded;
+  scenario.attitude.recorded = turned_to_the_sun(to_seconds(scenario.duration));
+  scenario.attitude.slews = std::vector<Slew>{};
+  scenario.star_tracker.aberration = StarTrackerScenario::Aberration::kUncorrected;
+  const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+  ASSERT_TRUE(run.orbital_error_over_field);
+  EXPECT_GT(*run.orbital_error_over_field, -5);
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
 }  // namespace
 }  // namespace trihedron::ground

@@ -201,7 +201,8 @@ struct CalibrationRun {
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
-  /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
+  /// Where a drift field was found, and eq. (1) alone would show such an error, or aberration, in its place: ln of its
+  /// odds against the field.
   std::optional<double> orbital_error_over_field;
   std::optional<FieldOrError> field_or_error;    ///< where a drift field was found that may be one
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
