@@ -780,7 +780,7 @@ class AtOrbit {
       drift_odds_ = instead->odds.drift;
       drift_over_field_ = less + log_odds(drift_odds_);
     }
-    const double aberration = instead->of_errors.aberration;
+    const double aberration = instead->of_errors.aberration - kUnusual;
     if (const double error_odds = has_error_ ? aberration : std::max(log_odds(instead->odds.error), aberration);
         error_odds > kLogOddsToAccept) {
       error_over_field_ = less + error_odds;
@@ -812,6 +812,9 @@ class AtOrbit {
   /// Members of the field, or noise, that were found without what comes back have taken a part of it: its odds are
   /// larger than these.
   static constexpr double kMayBeThere = -10;
+  /// ln of the odds before any pass for drift outside eq. (1), which all rotors have, against aberration that nobody
+  /// corrects.
+  static constexpr double kUnusual = 5;
 
   /// Drift that all gyros have alike, as an error of the star tracker looks, is not to be expected by eq. (1) alone.
   /// Beside other drift it is, and of any size.

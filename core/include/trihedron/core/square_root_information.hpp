@@ -126,10 +126,11 @@ class SquareRootInformation {
     const int d = dynamic_;
     const int c = states_ - d;
     DynamicMatrix M(d, d);
-    DynamicMatrix root = DynamicMatrix::Identity(d, d);  // of 1 + M Q Mᵀ, rows and columns from the last to the first
+    // Uᵀ with rows and columns from the last to the first, as it comes by rotations into an upper triangle.
+    DynamicMatrix reversed = DynamicMatrix::Identity(d, d);
     DynamicMatrix noises(d, d);
     for (int i = 0; i < d; ++i) {
-      const double* R = this->root().row(i);
+      const double* R = root().row(i);
       for (int j = 0; j < d; ++j) {
         double sum = 0;
         for (int k = i; k < d; ++k) {
@@ -139,15 +140,17 @@ class SquareRootInformation {
         noises(j, d - 1 - i) = sum * noise(j);
       }
     }
-    rotate_into(rows_of(root), rows_of(noises), d);
+    rotate_into(rows_of(reversed), rows_of(noises), d);
     for (int i = d - 1; i >= 0; --i) {
-      double* row = this->root().row(i);
+      double* row = root().row(i);
       const double* its = &M(i, 0);
       const auto first = static_cast<int>(std::find_if(its, its + i, [](double x) { return x != 0; }) - its);
       take_off(its + first, 1, {&B(first, 0), d - first, c, c}, row + d);
       std::copy_n(its, d, row);
-      const double* U = &root(d - 1 - i, d - 1 - i);  // that of row i; to the right of it, d before each other
-      take_off(U - d, -d, {row + states_ + 1, d - 1 - i, states_, states_ + 1}, row);
+      const double* U = &reversed(d - 1 - i, d - 1 - i);  // on the diagonal; those right of it lie d before one another
+      if (i + 1 < d) {
+        take_off(U - d, -d, {root().row(i + 1), d - 1 - i, states_, states_ + 1}, row);
+      }
       const double by = 1 / *U;
       std::for_each(row, row + states_, [by](double& x) { x *= by; });
     }
