@@ -128,7 +128,8 @@ TEST(SquareRootInformation, TakesNoiseOfAnySize) {
     const Long through = F * before.inverse();
     Long P = through * through.transpose();
     P.topLeftCorner(kDynamic, kDynamic) += noise.cast<long double>().cwiseAbs2().asDiagonal();
-    // R P Rᵀ is one, whatever the sizes of the components.
+    // R P Rᵀ is one, whatever the sizes of the components. Were U found by the squares of these, up to 1e8, it would be
+    // off by their rounding, 1e-8.
     const Long R = root(filter).cast<long double>().triangularView<Eigen::Upper>();
     EXPECT_LT((R * P * R.transpose() - Long::Identity(kStates, kStates)).norm(), 1e-10L) << trial;
   }

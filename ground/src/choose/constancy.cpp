@@ -179,6 +179,15 @@ VectorXd sigmas_of_aberration() {
   return sigmas;
 }
 
+/// An error of the star tracker at an angle's sine and cosine, six columns about c x, y, z: as alignments of all gyros.
+void add_error_at(double angle, const MatrixXd& rows, const Layout& layout, Eigen::Ref<MatrixXd> error) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+    error.leftCols<3>() += std::sin(angle) * by_alignment;
+    error.rightCols<3>() += std::cos(angle) * by_alignment;
+  }
+}
+
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
 /// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
@@ -191,16 +200,13 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const DriftModel& model_of_fie
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
   if (moment.fix->fix.head == 0) {
     add_aberration(moment, phase, rows, layout, shapes.leftCols<kOfAberration>());
+    for (int i = 0; i < kMultiplesOfRate; ++i) {
+      add_error_at((i + 2) * phase, rows, layout,
+                   shapes.middleCols<kOfMultiple>(kOfAberration + Index{kOfMultiple} * i));
+    }
   }
   for (int k = 0; k < layout.gyros; ++k) {
     const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
-    if (moment.fix->fix.head == 0) {
-      for (int i = 0; i < kMultiplesOfRate; ++i) {
-        const Index at = kOfAberration + Index{kOfMultiple} * i;
-        shapes.middleCols<3>(at) += std::sin((i + 2) * phase) * by_alignment;
-        shapes.middleCols<3>(at + 3) += std::cos((i + 2) * phase) * by_alignment;
-      }
-    }
     const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
     const Vector3d& h_b = moment.fix->h_b[k];
     Eigen::Matrix<double, 3, kOfReadout> read;   // what a reading is off by
@@ -880,15 +886,6 @@ LogEvidence evidence_of_shapes(const MatrixXd& information, Index at, const Vect
   const Index size = sigma.size();
   return log_evidence_of(sigma.asDiagonal() * information.block(at, at, size, size) * sigma.asDiagonal(),
                          sigma.cwiseProduct(information.col(information.cols() - 1).segment(at, size)));
-}
-
-/// An error of the star tracker at an angle's sine and cosine, six columns about c x, y, z: as alignments of all gyros.
-void add_error_at(double angle, const MatrixXd& rows, const Layout& layout, Eigen::Ref<MatrixXd> error) {
-  for (int k = 0; k < layout.gyros; ++k) {
-    const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
-    error.leftCols<3>() += std::sin(angle) * by_alignment;
-    error.rightCols<3>() += std::cos(angle) * by_alignment;
-  }
 }
 
 }  // namespace

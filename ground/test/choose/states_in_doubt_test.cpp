@@ -200,8 +200,8 @@ TEST(FieldOrError, IsNotTrustedWhereDriftWouldMoveTheAngleBetweenTheMomenta) {
   }
   const CalibrationRun run = calibrate(pass, CalibrationOptions());
   ASSERT_TRUE(run.field_or_error);
-  EXPECT_GT(run.field_or_error->error, 0.7 * run.field_or_error->field);
-  EXPECT_LT(run.field_or_error->field_by_angle, -5);
+  EXPECT_GT(run.field_or_error->error, 0.7 * run.field_or_error->field);  // it is what there is
+  EXPECT_LT(run.field_or_error->field_by_angle, -5);                      // at which the verdict forbids use
   EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
   EXPECT_FALSE(run.calibration.verdict.trustworthy);
   // Somebody may know that the star tracker has none.
@@ -217,7 +217,7 @@ TEST(FieldOrError, IsDriftWhereTheAngleShowsIt) {
   }
   const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
   ASSERT_TRUE(run.field_or_error);
-  EXPECT_GT(run.field_or_error->field_by_angle, 5);
+  EXPECT_GT(run.field_or_error->field_by_angle, 5);  // from which the verdict says nothing
   EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
 }
 
