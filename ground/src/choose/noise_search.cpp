@@ -183,4 +183,8 @@ NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions&
   return wandering_from({0}, false, trial, options);
 }
 
+void use_walk(const ProcessNoise& noise, CalibrationOptions& options) {
+  options.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+}
+
 }  // namespace trihedron::ground

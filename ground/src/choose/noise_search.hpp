@@ -32,4 +32,7 @@ struct NoiseFit {
 /// states found them.
 [[nodiscard]] NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options);
 
+/// Makes the options those with the random walk that was found.
+void use_walk(const ProcessNoise& noise, CalibrationOptions& options);
+
 }  // namespace trihedron::ground

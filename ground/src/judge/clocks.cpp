@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "judge/findings.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
@@ -44,11 +45,6 @@ std::string cure_of_star_tracker(const PassSettings& settings, double offset_s, 
   return fmt::format(
       "Correct the stamps of the star tracker, or say in pass.toml, [star_tracker]: clock_offset_s = {:.4f}{}.",
       settings.star_tracker_clock_offset_s + offset_s, rate == 0 ? "" : fmt::format(", clock_rate_s_s = {:.4g}", rate));
-}
-
-void add(std::vector<Finding>& findings, FindingCode code, Finding::Severity severity, std::string text,
-         std::string evidence, std::string cure) {
-  findings.push_back({code, std::move(text), std::move(evidence), std::move(cure), severity});
 }
 
 std::string offset_text(double offset_s) {
