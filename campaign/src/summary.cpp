@@ -458,6 +458,10 @@ void judge_number(const Records& trustworthy, CampaignSummary& summary) {
 
 }  // namespace
 
+std::string influential(const CampaignInput& input) {
+  return input.is_number() ? input.key : fmt::format("{} = {}", input.key, input.options.back());
+}
+
 std::span<const Measure> measures() { return kMeasures; }
 
 Consistency consistency_of(double sum, double freedom, double count) {

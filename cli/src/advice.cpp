@@ -86,6 +86,12 @@ std::string confirmation_text(const plan::Confirmation& confirmation) {
   fmt::format_to(out, "  simulated over predicted {}; mean NEES {} (expected {} ± {:.1f})\n",
                  figure("{:.2f}", confirmation.ratio), figure("{:.1f}", confirmation.nees), confirmation.parameters,
                  confirmation.nees_tolerance());
+  if (confirmation.contradicts()) {
+    text +=
+        "  The flights CONTRADICT the prediction: the scenario has what the settings leave out, as drift outside of "
+        "drift_model.\n"
+        "  → Leave drift_model and [further_states] to the program, or take from the scenario what there is not.\n";
+  }
   return text;
 }
 
@@ -117,7 +123,8 @@ nlohmann::ordered_json advice_json(const plan::Advice& advice, const plan::SlewL
     json["confirmation"] = {{"runs", confirmation->runs},
                             {"simulated_over_predicted", confirmation->ratio},
                             {"nees", confirmation->nees},
-                            {"parameters", confirmation->parameters}};
+                            {"parameters", confirmation->parameters},
+                            {"contradicted", confirmation->contradicts()}};
   }
   return json;
 }

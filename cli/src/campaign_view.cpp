@@ -157,8 +157,8 @@ std::string influences_text(const CampaignPlan& plan, const CampaignSummary& sum
     ++significant;
     if (shown < kShownInfluences) {
       ++shown;
-      text += fmt::format("  {:+.2f}  {:<40} {}\n", influence.correlation.rho, plan.inputs[influence.input].key,
-                          influence.measure->label);
+      text += fmt::format("  {:+.2f}  {:<40} {}\n", influence.correlation.rho,
+                          campaign::influential(plan.inputs[influence.input]), influence.measure->label);
     }
   }
   if (summary.pairs == 0) {

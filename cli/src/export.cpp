@@ -37,6 +37,7 @@ struct ExportArguments {
   std::string time_system = "TAI";
   std::string object_name;
   std::string inertial_frame;
+  std::string body_frame;
   io::MessageDescription description;
   std::string gap;
   std::string attitude;
@@ -138,6 +139,11 @@ io::MessageDescription description_of(const ExportArguments& arguments, const Ep
     description.inertial_frame = arguments.inertial_frame;
   } else if (!source.inertial_frame.empty()) {
     description.inertial_frame = source.inertial_frame;
+  }
+  if (!arguments.body_frame.empty()) {
+    description.body_frame = arguments.body_frame;
+  } else if (source.body_is_told) {
+    description.body_frame = "STARTRACKER_1";
   }
   if (!arguments.object_name.empty()) {
     description.object_name = arguments.object_name;
@@ -246,7 +252,8 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
   EpochSource epoch_source;
   if (!arguments.epoch.pass.empty()) {
     pass = io::read_named_pass(arguments.epoch.pass);
-    epoch_source = {pass->pass().settings.epoch, pass->pass().settings.spacecraft};
+    const PassSettings& settings = pass->pass().settings;
+    epoch_source = {settings.epoch, settings.spacecraft, {}, body_is_told(settings)};
   }
   const io::MessageDescription description = description_of(arguments, epoch_source);
   const Calibration calibration = io::read_calibration(source(arguments.file));
@@ -371,8 +378,10 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       ->add_option("--inertial-frame", arguments->inertial_frame,
                    "Name of the axes that q_in_c leads to (default: that of the pass, else GCRF)")
       ->type_name("NAME");
-  command->add_option("--body-frame", arguments->description.body_frame, "Name of the axes c, of the star tracker")
-      ->capture_default_str()
+  command
+      ->add_option("--body-frame", arguments->body_frame,
+                   "Name of the axes c, of the star tracker; SC_BODY_1, or STARTRACKER_1 where the pass says how that is "
+                   "mounted")
       ->type_name("NAME");
   command
       ->add_option("--object-name", arguments->object_name,

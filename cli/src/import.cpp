@@ -33,11 +33,16 @@ void add_epoch_options(CLI::App& command, EpochOptions& options, const std::stri
       ->type_name("TIME");
 }
 
+bool body_is_told(const PassSettings& settings) {
+  const std::optional<Eigen::Vector3d>& mounting = settings.star_tracker_mounting_rotation_vector_rad;
+  return mounting && !mounting->isZero(0);
+}
+
 EpochSource epoch_of(const EpochOptions& options) {
   if (!options.pass.empty()) {
     const io::NamedPass pass = io::read_named_pass(options.pass);
     const PassSettings& settings = pass.pass().settings;
-    return {settings.epoch, settings.spacecraft, settings.inertial_frame};
+    return {settings.epoch, settings.spacecraft, settings.inertial_frame, body_is_told(settings)};
   }
   if (options.epoch.empty()) {
     return {};

@@ -8,6 +8,7 @@
 
 #include "commands.hpp"
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/pass.hpp"
 
 namespace trihedron::cli {
 
@@ -24,7 +25,11 @@ struct EpochSource {
   std::optional<Time> epoch;
   std::string spacecraft;        ///< of the pass; empty without one
   std::string inertial_frame{};  ///< same
+  bool body_is_told = false;     ///< the pass says how the star tracker is mounted: its axes are not those of the body
 };
+
+/// Whether a pass says how its star tracker is mounted, other than along the axes of the body.
+[[nodiscard]] bool body_is_told(const PassSettings& settings);
 
 /// Throws UsageError where both say it, or the option is no time.
 [[nodiscard]] EpochSource epoch_of(const EpochOptions& options);

@@ -199,7 +199,7 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
     return observability_text(advice.before, scenario.epoch) + advice_text(advice, limits) +
            (confirmation ? confirmation_text(*confirmation) : "");
   });
-  return advice.after.is_harmful() ? kDoNotUse : kTrustworthy;
+  return advice.after.is_harmful() || (confirmation && confirmation->contradicts()) ? kDoNotUse : kTrustworthy;
 }
 
 }  // namespace

@@ -308,17 +308,22 @@ class DistributionReader {
   void read_options(const toml::array& list) {
     CampaignInput& input = varied_.input;
     bool all_numbers = true;
+    const toml::node* of_another_unit = nullptr;
     for (const toml::node& node : list) {
       const std::optional<Amount> found = amount_of(node);
       if (input.options.empty() && found) {
         input.unit = found->unit;
       }
-      all_numbers = all_numbers && found && found->unit == input.unit;
-      if (all_numbers) {
+      all_numbers = all_numbers && found;
+      if (found) {
         input.numbers.push_back(found->value);
+        of_another_unit = found->unit == input.unit ? of_another_unit : &node;
       }
       input.options.push_back(text_of(node));
       varied_.options.emplace_back().push_back(node);
+    }
+    if (all_numbers && of_another_unit != nullptr && !table_.contains("names")) {
+      static_cast<void>(like_others(*of_another_unit));  // refuses it: numbers in several units have no order
     }
     if (!all_numbers) {
       input.numbers.clear();

@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <memory>
+#include <map>
 #include <utility>
 
 #include "pass_toml.hpp"
@@ -262,6 +263,17 @@ Fields gyro_fields(GyroMap& map, const fs::path& file) {
     if (map.units.size() < 2 || map.units.size() > std::size_t{kMaxGyros}) {
       table.refuse(node, fmt::format("[[telemetry.gyro.unit]] is there {} times", map.units.size()),
                    fmt::format("attitude needs two gyros, and at most {} are handled", kMaxGyros));
+    }
+    std::map<std::string, std::size_t> gyro_of;
+    for (std::size_t k = 0; k < map.units.size(); ++k) {
+      for (const std::string& name : map.units[k].columns) {
+        const std::string bare = name.starts_with('-') ? name.substr(1) : name;
+        if (const auto [its, is_new] = gyro_of.try_emplace(bare, k); !is_new) {
+          table.refuse((*node.as_array())[k],
+                       fmt::format("column {} is that of gyro {} and of gyro {}", in_quotes(bare), its->second + 1, k + 1),
+                       "name for each gyro the columns that it has for itself");
+        }
+      }
     }
   });
   return table_fields(map, file) + Fields{time_column(map), required(std::move(units))};

@@ -52,6 +52,14 @@ TEST(DesignFlight, HasAReadingAtEachFix) {
   EXPECT_LT(ratio.maxCoeff(), 1.25);
 }
 
+/// Without noise two momenta that were started along one axis lie on one line exactly.
+TEST(DesignFlight, MayHaveTwoMomentaOnOneLine) {
+  Scenario scenario = advised().scenario;
+  scenario.gyros.push_back(scenario.gyros[0]);
+  const DesignFlight flight(scenario, told());
+  EXPECT_TRUE(flight.covariance_after(advised().slews()).allFinite());
+}
+
 TEST(Advice, MakesTheUnobservableObservable) {
   EXPECT_TRUE(advised().before.is_harmful());
   EXPECT_FALSE(advised().after.is_harmful());

@@ -275,7 +275,7 @@ json influence_rows(const CampaignReportInput& input) {
   for (const campaign::Influence& influence : input.summary.influences) {
     if (influence.is_significant) {
       rows.push_back(
-          {{"key", input.plan.inputs[influence.input].key},
+          {{"key", campaign::influential(input.plan.inputs[influence.input])},
            {"measure", influence.measure->label},
            {"rho", signed_number(influence.correlation.rho, 2)},
            {"p", influence.correlation.p_value < 1e-12 ? std::string("< 10⁻¹²")

@@ -156,13 +156,23 @@ std::optional<OpenLoopForecast> forecast_of(const CalibrationRun& run, Time end)
                   run.options.need);
 }
 
-/// With the parameters in use at the end of the pass.
+/// What a correction has just taken over; nothing where the next one takes over as much in no time.
+std::optional<Pipeline::Held> taken_over(const Pipeline& pipeline) {
+  constexpr Duration kInNoTime = std::chrono::minutes(1);
+  if (pipeline.correction_interval() < kInNoTime) {
+    return std::nullopt;
+  }
+  return Pipeline::Held{pipeline.gyros(), pipeline.errors()};
+}
+
+/// With the parameters in use at the end of the pass; `taken`: those that the last correction took over.
 OpenLoopForecast forecast_of(const CalibrationOptions& options, const Pipeline& pipeline,
-                             const AttitudeHistory& attitude) {
+                             const std::optional<Pipeline::Held>& taken, const AttitudeHistory& attitude) {
   const BodyMotion motion(attitude.t, attitude.q_in_c);
   const AttitudeRule rule = attitude_rule_of(options.estimator);
   if (options.corrections.take_parameters) {
-    return forecast(pipeline.errors(), pipeline.gyros(), motion, rule, options.need);
+    return taken ? forecast(taken->errors, taken->gyros, motion, rule, options.need)
+                 : forecast(pipeline.errors(), pipeline.gyros(), motion, rule, options.need);
   }
   // The next correction knows the attitude as well as the last one did.
   Eigen::Vector3d sigma_rad = attitude.sigma_rad.front();
@@ -172,6 +182,19 @@ OpenLoopForecast forecast_of(const CalibrationOptions& options, const Pipeline& 
   const Pipeline::Held held =
       pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()), Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
   return forecast(held.errors, held.gyros, motion, rule, options.need);
+}
+
+/// How far the parameters that were held are off those that the filter has found, where that is worst.
+void put_misfit_into(NavigationRun& run, const Pipeline& pipeline) {
+  double worst = -1;
+  for (const auto& [square, freedom] : pipeline.distances_from_prior()) {
+    const double limit = boost::math::quantile(boost::math::chi_squared(freedom), 0.999);
+    if (!(square / limit <= worst)) {
+      worst = square / limit;
+      run.held_parameters_misfit = square;
+      run.misfit_limit = limit;
+    }
+  }
 }
 
 /// What is corrected before the calibration: what is switched off is not.
@@ -548,8 +571,12 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   Pipeline pipeline(stamped.settings, settled_for_flight(stamped.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, stamped.gyro.size());
+  std::optional<Pipeline::Held> taken;
   replay(stamped, pipeline, [&](const StepReport& report) {
     recorder.add(report, pipeline);
+    if (report.corrected && options.corrections.take_parameters) {
+      taken = taken_over(pipeline);
+    }
     meter.step(report);
   });
   NavigationRun run = std::move(recorder).take();
@@ -558,12 +585,12 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   }
   add_statistics(run.fixes, run.statistics);
   if (!options.corrections.take_parameters) {
-    run.held_parameters_misfit = pipeline.squared_distance_from_prior();
-    run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
+    put_misfit_into(run, pipeline);
   }
   run.gyros = pipeline.layout().gyros;
+  run.has_clock_state = pipeline.layout().further.clock_offset;
   if (has_pair_at_end(run.gyro_events, run.gyros, stamped.gyro.t.back())) {
-    run.forecast = forecast_of(options, pipeline, run.attitude);
+    run.forecast = forecast_of(options, pipeline, taken, run.attitude);
   }
   run.clock_correction = correction;
   run.readout_noise = noise;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "judge/findings.hpp"
+#include "model/scatter.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
@@ -30,6 +31,9 @@ constexpr double kHeadsTooFar_s = 4e-3;
 constexpr double kNoneAlike_s = 5e-3;
 /// In orbital motion such stamps move a reading by the noise of the paper's gyros.
 constexpr double kTooScattered_s = 0.01;
+/// Where nothing is estimated of it, the attitude of a navigation is off by what the body turns in it, in sigmas.
+constexpr double kSeenTurned = 1;
+constexpr double kTooFarTurned = 2;
 
 /// Where the calibration in use had something to say of them.
 constexpr const char* kAfterCorrection = " though they were corrected as the calibration in use says";
@@ -213,6 +217,27 @@ void judge_further_star_trackers(const std::vector<Measured>& apart_s, std::vect
   }
 }
 
+/// By how many sigmas of the attitude, about one axis, the body turns in this time: the median over the pass, since a
+/// correction is seldom made in a slew.
+double turned_in_sigmas(const AttitudeHistory& attitude, double time_s) {
+  constexpr Duration kShort = std::chrono::seconds(3);  // noise of the readings makes no rate over it
+  constexpr Duration kLong = std::chrono::seconds(30);
+  std::vector<double> sigmas;
+  std::size_t last = 0;
+  for (std::size_t i = 1; i < attitude.size(); ++i) {
+    const Duration since = attitude.t[i] - attitude.t[last];
+    if (since < kShort) {
+      continue;
+    }
+    if (since < kLong) {
+      const double turned_rad = attitude.q_in_c[last].angularDistance(attitude.q_in_c[i]);
+      sigmas.push_back(turned_rad * std::abs(time_s) / to_seconds(since) * std::sqrt(3) / attitude.sigma_rad[i].norm());
+    }
+    last = i;
+  }
+  return sigmas.empty() ? 0 : median_of(sigmas);
+}
+
 }  // namespace
 
 void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -298,17 +323,23 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
   const Measured& middle = clocks.mid_offset_s;
   const double change_s =
       clocks.rate_s_s.is_sure(kSigmasToTell) ? clocks.rate_s_s.value * to_seconds(pass.settings.duration) : 0;
-  const bool far = middle.is_sure(kSigmasToTell) && std::abs(middle.value) > kTooFar_s;
-  if (far || std::abs(change_s) > kSeenChange_s) {
-    const bool wrong = far || std::abs(change_s) > kTooMuchChange_s;
+  const bool is_sure = middle.is_sure(kSigmasToTell);
+  const bool far = is_sure && std::abs(middle.value) > kTooFar_s;
+  const double turned_sigmas =
+      is_sure && !run.has_clock_state ? turned_in_sigmas(run.attitude, middle.value) : 0;
+  if (far || std::abs(change_s) > kSeenChange_s || turned_sigmas > kSeenTurned) {
+    const bool wrong = far || std::abs(change_s) > kTooMuchChange_s || turned_sigmas > kTooFarTurned;
     const Measured& at_epoch = change_s == 0 ? middle : clocks.offset_s;
     add(findings, FindingCode::kClocksApart, wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
         fmt::format("The stamps of the star tracker are off those of the gyros{}, which is in the attitude. {}",
                     corrected ? kAfterCorrection : "", kWhichClock),
         fmt::format(
             "fixes hold the attitude {} after their stamp in the middle of the pass; over the pass that changes "
-            "by {}",
-            offset_text(middle.value), offset_text(change_s)),
+            "by {}{}",
+            offset_text(middle.value), offset_text(change_s),
+            turned_sigmas > kSeenTurned
+                ? fmt::format("; in that time the body turns by {:.1f} sigmas of the attitude", turned_sigmas)
+                : ""),
         corrected ? kCureAfterCorrection
                   : cure_of_star_tracker(pass.settings, at_epoch.value, change_s == 0 ? 0 : clocks.rate_s_s.value));
   }

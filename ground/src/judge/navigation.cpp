@@ -5,6 +5,8 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 #include "judge/clocks.hpp"
 #include "judge/contradictions.hpp"
@@ -27,6 +29,53 @@ constexpr double kMostMissing = 0.5;
 
 constexpr const char* kLookAtCalibration =
     "Look at the calibration in use: its units (rad/s, rad), whether it is of these gyros and of this start-up.";
+
+/// Errors of fixes that follow each other and were rejected. Outliers, and noise of a star tracker in slews, are to all
+/// sides; where the parameters in use, or the star tracker, are off they are alike.
+void judge_rejected_alike(const std::vector<FixRecord>& fixes, std::vector<Finding>& findings) {
+  constexpr long kLeast = 5;  // in a row
+  constexpr double kAlike = 0.5;
+  constexpr double kSome = 0.01;
+  constexpr double kMany = 0.05;
+  struct Row {
+    long fixes = 0;
+    Eigen::VectorXd sum;
+    double square = 0;
+  };
+  std::map<int, Row> rows;  // by star tracker
+  long alike = 0;
+  const auto end = [&](Row& row) {
+    const auto count = static_cast<double>(row.fixes);
+    if (row.fixes >= kLeast && row.sum.squaredNorm() > kAlike * count * row.square) {
+      alike += row.fixes;
+    }
+    row = {};
+  };
+  for (const FixRecord& fix : fixes) {
+    Row& row = rows[fix.head];
+    if (fix.status != FixStatus::kRejectedByGate || fix.jumped) {
+      end(row);
+      continue;
+    }
+    const Eigen::VectorXd off = Eigen::VectorXd::Map(fix.innovation.data(), std::ssize(fix.innovation));
+    row.sum = row.fixes > 0 ? Eigen::VectorXd(row.sum + off) : off;
+    row.square += off.squaredNorm();
+    ++row.fixes;
+  }
+  for (auto& [head, row] : rows) {
+    end(row);
+  }
+  const auto all = static_cast<double>(fixes.size());
+  if (static_cast<double>(alike) > kSome * all) {
+    add(findings, FindingCode::kCalibrationDoesNotFit,
+        static_cast<double>(alike) > kMany * all ? Severity::kDoNotUse : Severity::kWarning,
+        "Fixes that follow each other contradict the attitude alike and were rejected: the calibration in use does not "
+        "fit the pass, or for a while the star tracker was off.",
+        fmt::format("{} of {} fixes, {} and more in a row", alike, fixes.size(), kLeast),
+        "Calibrate by this pass: it tells whether alignments are others by now, as after work on the star tracker, or "
+        "drift coefficients, as after a start of a rotor.");
+  }
+}
 
 /// Longer than the passes of one campaign are apart: without the name of the start-up nothing says that the rotors have
 /// not been started since.
@@ -159,6 +208,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_corrections(run, findings);
   judge_open_loops(run, findings);
   judge_rejections(run.statistics, findings);
+  judge_rejected_alike(run.fixes, findings);
   judge_widenings(run.fixes, pass.settings.epoch, findings);
   judge_star_tracker(run.statistics, findings);
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -292,9 +293,11 @@ Pipeline::Held Pipeline::held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d
           start_with_held_parameters(setup, held, program_->prior.covariance, C_in_c.raw(), covariance_rad2)};
 }
 
-double Pipeline::squared_distance_from_prior() const {
+auto Pipeline::distances_from_prior() const -> std::array<DistanceFromPrior, 3> {
   const Gyros gyros = program_->gyros();
   Eigen::VectorXd moved(layout().parameters());
+  std::vector<Eigen::Index> alignments;
+  std::vector<Eigen::Index> of_eq1;
   for (int k = 0; k < layout().gyros; ++k) {
     const Gyro& held = program_->prior.gyros[k];
     const int row = layout().drift(k) - layout().drift(0);
@@ -302,9 +305,21 @@ double Pipeline::squared_distance_from_prior() const {
         gyros[k].drift_rad_s.head(layout().drift_size()) - held.drift_rad_s.head(layout().drift_size());
     moved.segment<3>(row + layout().drift_size()) =
         Rot<C, C>::assume(Eigen::Matrix3d(gyros[k].C_c_b * held.C_c_b.transpose())).log().raw();
+    for (int i = 0; i < 3; ++i) {
+      alignments.push_back(row + layout().drift_size() + i);
+    }
+    for (int i = 0; i < Layout::kEq1; ++i) {
+      of_eq1.push_back(row + i);
+    }
   }
-  const Eigen::Index size = moved.size();
-  return moved.dot(program_->prior.covariance.topLeftCorner(size, size).llt().solve(moved));
+  std::vector<Eigen::Index> all(static_cast<std::size_t>(moved.size()));
+  std::iota(all.begin(), all.end(), 0);
+  const auto distance = [&](const std::vector<Eigen::Index>& states) {
+    const Eigen::VectorXd its = moved(states);
+    const Eigen::MatrixXd P = program_->prior.covariance(states, states);
+    return DistanceFromPrior{its.dot(P.llt().solve(its)), static_cast<int>(states.size())};
+  };
+  return {distance(all), distance(alignments), distance(of_eq1)};
 }
 
 Eigen::Vector3d Pipeline::apart_rad(const AttitudeSolution& attitude, const ComparedFix& its) const {

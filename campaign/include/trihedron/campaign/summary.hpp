@@ -85,6 +85,9 @@ struct Influence {
   bool is_significant = false;  ///< by chance in 5 % of campaigns at most one of all pairs would be
 };
 
+/// The key of an input that has influences; of two words with the second, whose correlation it is.
+[[nodiscard]] std::string influential(const CampaignInput& input);
+
 /// A run that an analyst should look at.
 struct WorstRun {
   std::uint64_t run = 0;

@@ -27,6 +27,10 @@ struct Confirmation {
 
   /// Two standard deviations of the mean NEES of so many runs, where the calibrations are consistent.
   [[nodiscard]] double nees_tolerance() const { return 2 * std::sqrt(2.0 * parameters / runs); }
+  /// Whether errors were larger than predicted by more than a factor of 1.2, and than chance makes.
+  [[nodiscard]] bool contradicts() const {
+    return !(nees <= parameters + 2.5 * nees_tolerance()) && !(nees <= 1.2 * 1.2 * parameters);
+  }
 };
 
 /// Flies the scenario with other seeds, alignments and drift drawn from what is known before, and calibrates each by

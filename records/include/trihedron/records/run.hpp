@@ -248,10 +248,11 @@ struct NavigationRun {
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
   std::vector<CorrelatedFixes> correlated_fixes;  ///< of the star trackers of which fixes were left out for it
   std::optional<Clocks> clocks;                   ///< where the pass shows them, behind this correction
+  bool has_clock_state = false;                   ///< an offset of the star tracker's clock is estimated along
   std::vector<OpenLoopEnd> open_loops;            ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
-  /// its 99.9 % limit.
+  /// its 99.9 % limit; of all of them, of the alignments or of the coefficients of eq. (1), whichever is worst.
   std::optional<double> held_parameters_misfit;
   double misfit_limit = 0;
   std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end; nothing without a pair there

@@ -2,6 +2,7 @@
 /// The on-board step on the ground: events in, one by one, in the order in which they came; reports out.
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -66,8 +67,13 @@ class Pipeline {
     OpenLoopStart errors;
   };
   [[nodiscard]] Held held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d& covariance_rad2) const;
-  /// (estimated − prior)ᵀ P⁻¹ (estimated − prior) of κ and δ, P the covariance of the prior.
-  [[nodiscard]] double squared_distance_from_prior() const;
+  /// (estimated − prior)ᵀ P⁻¹ (estimated − prior), P the covariance of the prior.
+  struct DistanceFromPrior {
+    double square = 0;
+    int degrees_of_freedom = 0;
+  };
+  /// Of κ and δ; of δ alone; of the coefficients of eq. (1) alone.
+  [[nodiscard]] std::array<DistanceFromPrior, 3> distances_from_prior() const;
 
   /// Of the latest sample used; needs one.
   [[nodiscard]] Time t() const;
