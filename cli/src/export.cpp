@@ -379,9 +379,10 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
                    "Name of the axes that q_in_c leads to (default: that of the pass, else GCRF)")
       ->type_name("NAME");
   command
-      ->add_option("--body-frame", arguments->body_frame,
-                   "Name of the axes c, of the star tracker; SC_BODY_1, or STARTRACKER_1 where the pass says how that is "
-                   "mounted")
+      ->add_option(
+          "--body-frame", arguments->body_frame,
+          "Name of the axes c, of the star tracker; SC_BODY_1, or STARTRACKER_1 where the pass says how that is "
+          "mounted")
       ->type_name("NAME");
   command
       ->add_option("--object-name", arguments->object_name,

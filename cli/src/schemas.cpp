@@ -247,9 +247,11 @@ Json observe_output() {
       object({{"begin_s", number()}, {"roll_rad", number()}, {"pitch_rad", number()}, {"yaw_rad", number()}});
   const Json gain =
       object({{"text", text()}, {"sigma_before", number()}, {"sigma_after", number()}, {"sigma_simulated?", number()}});
-  const Json confirmation =
-      object({{"runs", count()}, {"simulated_over_predicted", number()}, {"nees", number()}, {"parameters", count()},
-              {"contradicted", flag()}});
+  const Json confirmation = object({{"runs", count()},
+                                    {"simulated_over_predicted", number()},
+                                    {"nees", number()},
+                                    {"parameters", count()},
+                                    {"contradicted", flag()}});
   const Json advice = object({{"max_slew_rate_rad_s", number()},
                               {"slews", array(slew)},
                               {"why_no_slews?", text()},

@@ -336,6 +336,7 @@ def with_key(line):
     (with_key('gyro.readout.spike = {normal = ["1arcsec", "-2arcsec"]}'), ["c.toml:23:", "sigma"]),
     (with_key('gyro.readout.spike = {lognormal = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "factor"]),
     (with_key('gyro.readout.spike = {loguniform = ["0arcsec", "2arcsec"]}'), ["c.toml:23:", "logarithm"]),
+    (with_key('gyro.readout.spike = {choice = ["0.1arcmin", "2arcsec"]}'), ["c.toml:23:", "arcmin", "in one unit"]),
     (with_key('gyro.readout.spike = {normal = ["1arcsec", "2arcsec"], min = "5arcmin"}'), ["c.toml:23:", "one unit"]),
     (with_key('gyro.readout.spike = {normal = ["1arcsec", "2arcsec"], min = "50arcsec"}'), ["c.toml:23:", "nothing can be drawn"]),
     (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], min = "0arcsec"}'), ["c.toml:23:", "no meaning"]),

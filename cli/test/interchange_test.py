@@ -1,6 +1,7 @@
 """export and import: what they write, refuse, and never replace. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
 import datetime
 import json
+import shutil
 import struct
 import tomllib
 
@@ -81,6 +82,17 @@ def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
         done("simulate", tmp_path / f"{form}.toml", "-o", tmp_path / form)
     truth = [(tmp_path / form / "truth.csv").read_bytes() for form in ("csv", "xml", "bc")]
     assert truth[0] == truth[1] == truth[2] and len(truth[0].splitlines()) > 2
+
+
+def test_the_star_tracker_is_not_called_the_body_where_it_is_mounted_otherwise(flown, tmp_path):
+    shutil.copytree(flown / "pass", tmp_path / "pass")
+    settings = (tmp_path / "pass" / "pass.toml").read_text()
+    (tmp_path / "pass" / "pass.toml").write_text(settings.replace("[star_tracker]", "[star_tracker]\nmounting_rotation_vector_rad = [0, 0, 0.5]", 1))
+    export = ("export", flown / "a.csv", "--format", "aem", "-o", "-", "--pass", tmp_path / "pass")
+    assert "REF_FRAME_B = STARTRACKER_1" in done(*export).stdout
+    assert "REF_FRAME_B = SC_BODY_1" in done(*export, "--body-frame", "SC_BODY_1").stdout
+    (tmp_path / "pass" / "pass.toml").write_text(settings)
+    assert "REF_FRAME_B = SC_BODY_1" in done(*export).stdout
 
 
 def test_streams(flown, tmp_path):

@@ -92,6 +92,20 @@ TEST(Comparison, JacobianIsThatOfTheInnovation) {
   }
 }
 
+/// As of a third gyro that was started along the axis of the first, in a plan without noise.
+TEST(Comparison, HasTwoComponentsOfAMomentumOnOneLineWithAnother) {
+  const Layout layout{.gyros = 3};
+  Scene scene(layout);
+  scene.gyros[2] = scene.gyros[0];
+  const FixComparison comparison =
+      compare(layout, scene.gyros, scene.C_in_c, scene.C_in_c, scene.h_b, all_gyros(3), scene.by_shared);
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Matrix<double, 2, 3>& by_phi = comparison.gyros[k].by_phi;
+    EXPECT_LT((by_phi * by_phi.transpose() - Eigen::Matrix2d::Identity()).norm(), 1e-15) << k;
+    EXPECT_LT((by_phi * scene.gyros[k].h_in).norm(), 1e-15) << k;
+  }
+}
+
 TEST(Comparison, NoiseIsThatOfFixAndReadouts) {
   const Layout layout{.gyros = 3};
   const Scene scene(layout);

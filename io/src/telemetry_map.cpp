@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <memory>
 #include <map>
+#include <memory>
 #include <utility>
 
 #include "pass_toml.hpp"
@@ -269,9 +269,10 @@ Fields gyro_fields(GyroMap& map, const fs::path& file) {
       for (const std::string& name : map.units[k].columns) {
         const std::string bare = name.starts_with('-') ? name.substr(1) : name;
         if (const auto [its, is_new] = gyro_of.try_emplace(bare, k); !is_new) {
-          table.refuse((*node.as_array())[k],
-                       fmt::format("column {} is that of gyro {} and of gyro {}", in_quotes(bare), its->second + 1, k + 1),
-                       "name for each gyro the columns that it has for itself");
+          table.refuse(
+              (*node.as_array())[k],
+              fmt::format("column {} is that of gyro {} and of gyro {}", in_quotes(bare), its->second + 1, k + 1),
+              "name for each gyro the columns that it has for itself");
         }
       }
     }

@@ -512,6 +512,8 @@ INSTANTIATE_TEST_SUITE_P(
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-A1\"]", "not a list of 3 names"},
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-A3\", \"A2\"]", "has \"A3\" twice"},
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-\", \"A2\"]", "a name that is empty"},
+        Spoilt{"[\"B1\", \"B2\", \"B3\"]", "[\"B1\", \"-A1\", \"B3\"]",
+               "column \"A1\" is that of gyro 1 and of gyro 2"},
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-A1\", \"A9\"]", "gyros.txt:2: lacks column \"A9\""},
         Spoilt{"counts_per_unit = 32768", "counts_per_unit = 0", "counts_per_unit"},
         Spoilt{"good = [1, 3]", "", "belong together"}, Spoilt{"good = [1, 3]", "good = 1", "no list"},

@@ -44,5 +44,18 @@ TEST(Confirmation, AgreesWithThePrediction) {
   }
 }
 
+TEST(Confirmation, ContradictsWhereErrorsAreLargerThanPredicted) {
+  Confirmation confirmation{.runs = 10, .parameters = 20};
+  for (const auto& [nees, contradicts] : {std::pair(20.0, false), {28.0, false}, {36.0, true}, {1e5, true}}) {
+    confirmation.nees = nees;
+    EXPECT_EQ(confirmation.contradicts(), contradicts) << nees;
+  }
+  confirmation.runs = 1000;
+  confirmation.nees = 25;  // not chance, but sigmas are too small by 1.1 only
+  EXPECT_FALSE(confirmation.contradicts());
+  confirmation.nees = std::nan("");
+  EXPECT_TRUE(confirmation.contradicts());
+}
+
 }  // namespace
 }  // namespace trihedron::plan

@@ -325,8 +325,7 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
       clocks.rate_s_s.is_sure(kSigmasToTell) ? clocks.rate_s_s.value * to_seconds(pass.settings.duration) : 0;
   const bool is_sure = middle.is_sure(kSigmasToTell);
   const bool far = is_sure && std::abs(middle.value) > kTooFar_s;
-  const double turned_sigmas =
-      is_sure && !run.has_clock_state ? turned_in_sigmas(run.attitude, middle.value) : 0;
+  const double turned_sigmas = is_sure && !run.has_clock_state ? turned_in_sigmas(run.attitude, middle.value) : 0;
   if (far || std::abs(change_s) > kSeenChange_s || turned_sigmas > kSeenTurned) {
     const bool wrong = far || std::abs(change_s) > kTooMuchChange_s || turned_sigmas > kTooFarTurned;
     const Measured& at_epoch = change_s == 0 ? middle : clocks.offset_s;

@@ -480,6 +480,19 @@ TEST(Navigate, KnowsHowWrongTheParametersItHoldsMayBe) {
   EXPECT_LT(*run.held_parameters_misfit, run.misfit_limit);  // the truth is a draw from the prior
 }
 
+/// The filter that runs along knows much at the end of the pass; what nothing takes over makes no attitude better.
+TEST(Navigate, PredictsByTheParametersThatACorrectionTookOver) {
+  CalibrationOptions options = told();
+  options.need = Need{5 * kArcminute, std::chrono::hours(1)};
+  const auto met = [&](CorrectionOptions::When when) {
+    options.corrections.when = when;
+    return navigate(two_hours().pass, options).forecast.value().need.value().met;
+  };
+  EXPECT_FALSE(met(CorrectionOptions::When::kOnlyFirst));
+  EXPECT_TRUE(met(CorrectionOptions::When::kEvery));
+  EXPECT_TRUE(met(CorrectionOptions::When::kEachFix));
+}
+
 TEST(Replay, TellsOfFixesAfterTheLastSample) {
   Pass pass = two_hours().pass;
   pass.gyro.t.resize(8 * 3600);

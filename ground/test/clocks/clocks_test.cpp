@@ -419,6 +419,25 @@ TEST(Calibrate, LeavesClocksThatAreSwitchedOffAndSaysSo) {
   expect_finding(run.calibration.verdict, FindingCode::kClocksApart, "clock_offset_s = -");
 }
 
+/// A calibration that found no offset of the clock has no state for one that comes later: it is in the attitude, in
+/// orbital motion 0.2″ a millisecond.
+TEST(Navigate, ForbidsAClockThatIsOffWhereNoStateHoldsIt) {
+  Scenario scenario = scenario_in_eq1(3, std::chrono::hours(2));
+  const Calibration before = calibrate(sim::simulate(scenario).pass, told()).calibration;
+  const auto verdict_with = [&](double offset_s) {
+    scenario.star_tracker.clock_offset_s = offset_s;
+    Pass pass = sim::simulate(scenario).pass;
+    pass.settings.prior = before;
+    CalibrationOptions options = told();
+    options.corrections.take_parameters = false;
+    return navigate(pass, options).verdict;
+  };
+  EXPECT_FALSE(verdict_with(0).has(FindingCode::kClocksApart));
+  const Verdict off = verdict_with(0.2);
+  expect_finding(off, FindingCode::kClocksApart, "clock_offset_s = 0.0");
+  EXPECT_FALSE(off.trustworthy);
+}
+
 TEST(Navigate, TellsOfClocksThatAreApart) {
   const auto verdict_with = [](double offset_s, double rate, double late_s) {
     Scenario scenario = scenario_in_eq1(3, std::chrono::hours(2));

@@ -831,6 +831,38 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
   EXPECT_THAT(codes(verdict()), ElementsAre("star-tracker-frozen"));
 }
 
+/// Fixes of a star tracker that was remounted are rejected in slews, all to one side; outliers, and noise that is
+/// larger in slews, are so to all sides.
+TEST(Verdict, OfANavigationForbidsFixesThatContradictItAlike) {
+  NavigationRun run = good_navigation();
+  const auto reject = [&](std::size_t many, double common_rad, double noise_rad) {
+    run.fixes.assign(7200, {.status = FixStatus::kUsed, .innovation = {0, 0, 0, 0}});
+    std::mt19937_64 stream(1);
+    std::normal_distribution<double> normal;
+    for (std::size_t i = 0; i < many; ++i) {
+      FixRecord& fix = run.fixes[1000 + i + i / 40 * 60];  // forty in a row, then used for three minutes
+      fix.status = FixStatus::kRejectedByGate;
+      for (double& component : fix.innovation) {
+        component = common_rad + noise_rad * normal(stream);
+      }
+    }
+    return judge_navigation(good_pass(), run);
+  };
+  const Verdict remounted = reject(1000, 1e-3, 2e-4);
+  EXPECT_THAT(codes(remounted), ElementsAre("calibration-does-not-fit"));
+  EXPECT_FALSE(remounted.trustworthy);
+  EXPECT_EQ(remounted.findings.at(0).evidence, "1000 of 7200 fixes, 5 and more in a row");
+  EXPECT_TRUE(reject(200, 1e-3, 2e-4).trustworthy);
+  EXPECT_THAT(codes(reject(200, 1e-3, 2e-4)), ElementsAre("calibration-does-not-fit"));
+  EXPECT_THAT(codes(reject(40, 1e-3, 2e-4)), IsEmpty());
+  EXPECT_THAT(codes(reject(1000, 0, 1e-3)), IsEmpty());
+  static_cast<void>(reject(1000, 1e-3, 2e-4));
+  for (FixRecord& fix : run.fixes) {
+    fix.jumped = true;  // the star tracker's fault, which is told otherwise
+  }
+  EXPECT_THAT(codes(judge_navigation(good_pass(), run)), IsEmpty());
+}
+
 TEST(Verdict, OfANavigationFindsSamplesWithoutAttitude) {
   NavigationRun run = good_navigation();
   const auto verdict = [&] { return judge_navigation(good_pass(), run); };
