@@ -663,7 +663,7 @@ std::variant<AttitudeMessage, CalibrationMessage> read_message(const std::filesy
     return parse_calibration_message(content.text(), file);
   }
   if (!is_attitude_message(content.text())) {
-    refuse_utf16(content.text(), file);
+    refuse_other_than_text(content.text(), file);
     throw InputRefused(file, {}, "is nothing that can be imported",
                        "give a telemetry.toml, a pass, or a message: AEM, APM or ACM as text (CCSDS_AEM_VERS in its "
                        "first line) or XML, or a C-kernel of SPICE");

@@ -760,7 +760,7 @@ Eigen::MatrixXd covariance_of_all(const Calibration& calibration) {
 
 Calibration read_calibration(const std::filesystem::path& path) {
   const TextFile file(path);
-  refuse_utf16(file.text(), path);
+  refuse_other_than_text(file.text(), path);
   if (!begins_as_json(file.text())) {
     throw InputRefused(path, {}, "is no calibration.json: it does not begin with {",
                        "give the calibration.json that `trihedron calibrate` writes; `import` makes one of an ACM");

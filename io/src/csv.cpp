@@ -132,7 +132,7 @@ Series parse_csv(const TextFile& content, const fs::path& file, ChooseRules choo
   std::string_view text = content.text();
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
 
-  refuse_utf16(text, file);
+  refuse_other_than_text(text, file);
   const std::size_t header_end = std::min(text.find('\n'), text.size());
   const std::string_view first_line = text.substr(0, header_end);
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {

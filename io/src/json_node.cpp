@@ -11,7 +11,7 @@
 namespace trihedron::io {
 
 Json parse_json(std::string_view text, const std::filesystem::path& file) {
-  refuse_utf16(text, file);
+  refuse_other_than_text(text, file);
   try {
     return Json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {

@@ -237,7 +237,7 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
                                const std::vector<std::string>& stamps, const std::vector<std::string>& numbers) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
-  refuse_utf16(text, file);
+  refuse_other_than_text(text, file);
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
     throw InputRefused(file, {}, "is empty", "give a file with the columns that the telemetry.toml names");
   }

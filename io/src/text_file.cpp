@@ -67,7 +67,10 @@ TextFile::TextFile(const std::filesystem::path& path) {
   bytes_[size_] = '\n';
 }
 
-void refuse_utf16(std::string_view text, const std::filesystem::path& file) {
+void refuse_other_than_text(std::string_view text, const std::filesystem::path& file) {
+  if (text.starts_with("\x1F\x8B")) {
+    throw InputRefused(file, {1, 1}, "is compressed", "unpack it: gunzip");
+  }
   const bool has_mark = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
   // Without a mark: every other octet of ASCII is zero.
   const bool is_wide = text.size() > 1 && (text[0] == '\0') != (text[1] == '\0');

@@ -24,7 +24,8 @@ class TextFile {
   std::size_t size_ = 0;
 };
 
-/// Throws InputRefused for a text in UTF-16, as some programs of Windows write it: what reads texts here takes UTF-8.
-void refuse_utf16(std::string_view text, const std::filesystem::path& file);
+/// Throws InputRefused for a text in UTF-16, as some programs of Windows write it, since what reads texts here takes
+/// UTF-8; and for a compressed file.
+void refuse_other_than_text(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace trihedron::io

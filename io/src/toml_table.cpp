@@ -113,7 +113,7 @@ Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_vie
 }
 
 toml::table parse_toml(std::string_view text, const std::filesystem::path& file) {
-  refuse_utf16(text, file);
+  refuse_other_than_text(text, file);
   try {
     toml::table document = toml::parse(text, file.string());
     if (const toml::node* const version = document.get(kVersionKey)) {

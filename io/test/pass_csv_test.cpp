@@ -137,6 +137,7 @@ TEST_F(PassCsv, RefusesOtherSeparatorsDecimalCommasAndUtf16NamingThem) {
   }
   EXPECT_THAT(refusal_with("gyro.csv", wide), HasSubstr("gyro.csv:1:1: is UTF-16"));
   EXPECT_THAT(refusal_with("gyro.csv", "\xFF\xFE" + wide), HasSubstr("gyro.csv:1:1: is UTF-16"));
+  EXPECT_THAT(refusal_with("gyro.csv", "\x1F\x8B\x08"), HasSubstr("gyro.csv:1:1: is compressed; unpack it: gunzip"));
   clean_pass().save_directory(directory_.path());
   EXPECT_THAT(refusal_with("pass.toml", "\xFE\xFF[pass]\n"), HasSubstr("pass.toml:1:1: is UTF-16"));
 }

@@ -234,6 +234,12 @@ void NavigationRecorder::add_fix(const StepReport& report, const Pipeline& pipel
   const FixRecord& fix = run_.fixes.emplace_back(record_of(report, pipeline.layout().gyros));
   corrections_.add(fix, pipeline.correction_interval());
   if (report.corrected) {
+    // All later fixes contradicted the one that started filter and navigator: it was an outlier, which tells nothing of
+    // the parameters.
+    constexpr Duration kSoon = std::chrono::minutes(5);
+    if (fix.status == FixStatus::kUsedAfterReopening && corrections_.made() == 2 && fix.t - corrected_ < kSoon) {
+      last_compared_.clear();
+    }
     corrected_ = fix.t;
     end_open_loop();
   } else if (fix.head == 0 && !fix.jumped && report.navigated && report.compared) {

@@ -345,6 +345,19 @@ TEST(Navigate, WithAGoodCalibrationHasNoFindings) {
   EXPECT_EQ(run.samples[SampleStatus::kUsed], static_cast<long>(run.attitude.size()));
 }
 
+/// One minute of attitude is wrong, which is said; the calibration in use is not to blame for it.
+TEST(Navigate, IsNotForbiddenForAFirstFixThatIsAnOutlier) {
+  Pass pass = two_hours().pass;
+  CalibrationOptions options = told();
+  pass.settings.prior = calibrate(pass, options).calibration;
+  options.corrections = {CorrectionOptions::When::kEvery, minutes(30), false};
+  pass.star_tracker.q_in_c[0] *= Eigen::Quaterniond(Eigen::AngleAxisd(kDegree, Eigen::Vector3d::UnitX()));
+  const NavigationRun run = navigate(pass, options);
+  EXPECT_TRUE(run.verdict.trustworthy);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kReopened));
+  EXPECT_FALSE(run.verdict.has(FindingCode::kAttitudeOffFixes));
+}
+
 TEST(Navigate, WithCoefficientsTenThousandTimesTooLargeIsNotToBeUsed) {
   const NavigationRun run = navigate_with([](Calibration& calibration) {
     for (GyroCalibration& gyro : calibration.gyros) {

@@ -836,7 +836,8 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
 TEST(Verdict, OfANavigationForbidsFixesThatContradictItAlike) {
   NavigationRun run = good_navigation();
   const auto reject = [&](std::size_t many, double common_rad, double noise_rad) {
-    run.fixes.assign(7200, {.status = FixStatus::kUsed, .innovation = {0, 0, 0, 0}});
+    run.fixes.assign(
+        7200, {.status = FixStatus::kUsed, .innovation = {0, 0, 0, 0}, .innovation_sigma = {1e-4, 1e-4, 1e-4, 1e-4}});
     std::mt19937_64 stream(1);
     std::normal_distribution<double> normal;
     for (std::size_t i = 0; i < many; ++i) {
