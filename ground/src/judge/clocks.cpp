@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -231,7 +232,8 @@ double turned_in_sigmas(const AttitudeHistory& attitude, double time_s) {
     }
     if (since < kLong) {
       const double turned_rad = attitude.q_in_c[last].angularDistance(attitude.q_in_c[i]);
-      sigmas.push_back(turned_rad * std::abs(time_s) / to_seconds(since) * std::sqrt(3) / attitude.sigma_rad[i].norm());
+      sigmas.push_back(turned_rad * std::abs(time_s) / to_seconds(since) * std::numbers::sqrt3 /
+                       attitude.sigma_rad[i].norm());
     }
     last = i;
   }

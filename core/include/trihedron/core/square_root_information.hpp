@@ -1,8 +1,8 @@
 #pragma once
 /// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete
-/// Sequential Estimation", 1977). Process noise is that of Dyer and McReynolds, 1969, by a triangle of the moving states
-/// alone in place of their larger array. Sizes are known at run time, storage is of fixed capacity; the work is done by
-/// plain loops, compiled once.
+/// Sequential Estimation", 1977). Process noise is that of Dyer and McReynolds, 1969, by a triangle of the moving
+/// states alone in place of their larger array. Sizes are known at run time, storage is of fixed capacity; the work is
+/// done by plain loops, compiled once.
 
 #include <Eigen/Core>
 #include <algorithm>
