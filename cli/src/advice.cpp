@@ -88,9 +88,10 @@ std::string confirmation_text(const plan::Confirmation& confirmation) {
                  confirmation.nees_tolerance());
   if (confirmation.contradicts()) {
     text +=
-        "  The flights CONTRADICT the prediction: the scenario has what the settings leave out, as drift outside of "
-        "drift_model.\n"
-        "  → Leave drift_model and [further_states] to the program, or take from the scenario what there is not.\n";
+        "  The flights CONTRADICT the prediction: the scenario may have what the settings leave out, as drift outside "
+        "of drift_model.\n"
+        "  → Leave drift_model and [further_states] to the program, or remove from the scenario drift that the real "
+        "gyros do not have.\n";
   }
   return text;
 }

@@ -25,7 +25,7 @@ class TextFile {
 };
 
 /// Throws InputRefused for a text in UTF-16, as some programs of Windows write it, since what reads texts here takes
-/// UTF-8; and for a compressed file.
+/// UTF-8; and for a file that gzip has compressed.
 void refuse_other_than_text(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace trihedron::io

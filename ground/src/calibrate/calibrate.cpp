@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -186,13 +187,16 @@ OpenLoopForecast forecast_of(const CalibrationOptions& options, const Pipeline& 
 
 /// How far the parameters that were held are off those that the filter has found, where that is worst.
 void put_misfit_into(NavigationRun& run, const Pipeline& pipeline) {
+  constexpr double kFalseAlarm = 0.001;  // of all three
   double worst = -1;
-  for (const auto& [square, freedom] : pipeline.distances_from_prior()) {
-    const double limit = boost::math::quantile(boost::math::chi_squared(freedom), 0.999);
+  for (const auto& [of, square, freedom] : pipeline.distances_from_prior()) {
+    const double limit =
+        boost::math::quantile(boost::math::complement(boost::math::chi_squared(freedom), kFalseAlarm / 3));
     if (!(square / limit <= worst)) {
-      worst = square / limit;
+      worst = std::isfinite(square) ? square / limit : std::numeric_limits<double>::infinity();
       run.held_parameters_misfit = square;
       run.misfit_limit = limit;
+      run.misfit_of = of;
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "choose/by_pass.hpp"
 #include "choose/noise_search.hpp"

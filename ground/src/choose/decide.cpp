@@ -8,7 +8,7 @@
 #include "batch/left_out_walk.hpp"
 #include "choose/by_pass.hpp"
 #include "choose/course.hpp"
-#include "choose/settle.hpp"
+#include "choose/open_choices.hpp"
 #include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"

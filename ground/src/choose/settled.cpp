@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
-#include "choose/settle.hpp"
+#include "choose/open_choices.hpp"
 #include "model/drift_on_board.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "judge/findings.hpp"
 #include "model/scatter.hpp"
+#include "trihedron/core/attitude.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
@@ -218,11 +218,10 @@ void judge_further_star_trackers(const std::vector<Measured>& apart_s, std::vect
   }
 }
 
-/// By how many sigmas of the attitude, about one axis, the body turns in this time: the median over the pass, since a
-/// correction is seldom made in a slew.
+/// By how many sigmas of the attitude the body turns in this time: the median over the pass, since a correction is
+/// seldom made in a slew.
 double turned_in_sigmas(const AttitudeHistory& attitude, double time_s) {
   constexpr Duration kShort = std::chrono::seconds(3);  // noise of the readings makes no rate over it
-  constexpr Duration kLong = std::chrono::seconds(30);
   std::vector<double> sigmas;
   std::size_t last = 0;
   for (std::size_t i = 1; i < attitude.size(); ++i) {
@@ -230,10 +229,11 @@ double turned_in_sigmas(const AttitudeHistory& attitude, double time_s) {
     if (since < kShort) {
       continue;
     }
-    if (since < kLong) {
-      const double turned_rad = attitude.q_in_c[last].angularDistance(attitude.q_in_c[i]);
-      sigmas.push_back(turned_rad * std::abs(time_s) / to_seconds(since) * std::numbers::sqrt3 /
-                       attitude.sigma_rad[i].norm());
+    const Eigen::Quaterniond turn = attitude.q_in_c[last].conjugate() * attitude.q_in_c[i];
+    const Eigen::Vector3d turned_rad = Rot<C, C>::assume(turn).log().raw() * (time_s / to_seconds(since));
+    const double in_sigmas = turned_rad.cwiseQuotient(attitude.sigma_rad[i]).norm();
+    if (std::isfinite(in_sigmas)) {
+      sigmas.push_back(in_sigmas);
     }
     last = i;
   }

@@ -111,7 +111,7 @@ const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind, 
   return largest;
 }
 
-void judge(const AtOrbitalPeriod& its, const CalibrationRun& run, std::vector<Finding>& findings) {
+void judge_what_comes_back(const AtOrbitalPeriod& its, const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
   const bool is_error = its.state == FurtherState::kOrbitalError;
   std::optional<double> over_other = run.orbital_error_over_drift;
@@ -213,8 +213,8 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
 }
 
 void judge_at_orbital_period(const CalibrationRun& run, std::vector<Finding>& findings) {
-  judge(kErrorAtOrbitalPeriod, run, findings);
-  judge(kDriftAtOrbitalPeriod, run, findings);
+  judge_what_comes_back(kErrorAtOrbitalPeriod, run, findings);
+  judge_what_comes_back(kDriftAtOrbitalPeriod, run, findings);
 }
 
 void judge_field_or_error(const CalibrationRun& run, std::vector<Finding>& findings) {

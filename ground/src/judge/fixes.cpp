@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <utility>
 
 #include "judge/findings.hpp"
 #include "judge/shape_of_errors.hpp"

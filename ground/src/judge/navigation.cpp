@@ -1,12 +1,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "judge/clocks.hpp"
 #include "judge/contradictions.hpp"
@@ -30,48 +34,63 @@ constexpr double kMostMissing = 0.5;
 constexpr const char* kLookAtCalibration =
     "Look at the calibration in use: its units (rad/s, rad), whether it is of these gyros and of this start-up.";
 
-/// Errors of fixes that follow each other and were rejected. Outliers, and noise of a star tracker in slews, are to all
-/// sides; where the parameters in use, or the star tracker, are off they are alike.
-void judge_rejected_alike(const std::vector<FixRecord>& fixes, std::vector<Finding>& findings) {
-  constexpr long kLeast = 5;  // in a row
+/// Fixes that were rejected in a row and are off alike, all star trackers together. Outliers, and noise of a star
+/// tracker in slews, are to all sides; where the parameters in use, or the star tracker, are off they are alike. Not
+/// those that contradict a first fix, which was an outlier then.
+long rejected_alike(const std::vector<FixRecord>& fixes, long least_in_a_row) {
   constexpr double kAlike = 0.5;
-  constexpr double kSome = 0.01;
-  constexpr double kMany = 0.05;
   struct Row {
     long fixes = 0;
     Eigen::VectorXd sum;
     double square = 0;
   };
   std::map<int, Row> rows;  // by star tracker
+  FixStatus last_used = FixStatus::kNone;
   long alike = 0;
   const auto end = [&](Row& row) {
     const auto count = static_cast<double>(row.fixes);
-    if (row.fixes >= kLeast && row.sum.squaredNorm() > kAlike * count * row.square) {
+    if (row.fixes >= least_in_a_row && row.sum.squaredNorm() > kAlike * count * row.square) {
       alike += row.fixes;
     }
     row = {};
   };
   for (const FixRecord& fix : fixes) {
     Row& row = rows[fix.head];
-    if (fix.status != FixStatus::kRejectedByGate || fix.jumped) {
-      end(row);
+    if (fix.status == FixStatus::kRejectedByGate && !fix.jumped) {
+      const Eigen::VectorXd off = Eigen::VectorXd::Map(fix.innovation.data(), std::ssize(fix.innovation));
+      row.sum = row.fixes > 0 ? Eigen::VectorXd(row.sum + off) : off;
+      row.square += off.squaredNorm();
+      ++row.fixes;
       continue;
     }
-    const Eigen::VectorXd off = Eigen::VectorXd::Map(fix.innovation.data(), std::ssize(fix.innovation));
-    row.sum = row.fixes > 0 ? Eigen::VectorXd(row.sum + off) : off;
-    row.square += off.squaredNorm();
-    ++row.fixes;
+    if (last_used == FixStatus::kStarted && fix.status == FixStatus::kUsedAfterReopening) {
+      rows.clear();
+    } else {
+      end(row);
+    }
+    last_used = fix.used() ? fix.status : last_used;
   }
   for (auto& [head, row] : rows) {
     end(row);
   }
-  const auto all = static_cast<double>(fixes.size());
-  if (static_cast<double>(alike) > kSome * all) {
-    add(findings, FindingCode::kCalibrationDoesNotFit,
-        static_cast<double>(alike) > kMany * all ? Severity::kDoNotUse : Severity::kWarning,
+  return alike;
+}
+
+/// Whether fixes contradict the calibration that a navigation began with. Where they contradict one gyro alone, that is
+/// told already.
+void judge_rejected_alike(const std::vector<FixRecord>& fixes, std::vector<Finding>& findings) {
+  constexpr long kLeastInARow = 8;
+  constexpr long kLeast = 40;
+  constexpr double kSome = 0.01;
+  constexpr double kMany = 0.05;
+  const long alike = rejected_alike(fixes, kLeastInARow);
+  const double share = static_cast<double>(alike) / static_cast<double>(std::max(fixes.size(), std::size_t{1}));
+  const bool is_told = std::ranges::find(findings, FindingCode::kGyroContradicted, &Finding::code) != findings.end();
+  if (alike >= kLeast && share > kSome && !is_told) {
+    add(findings, FindingCode::kCalibrationDoesNotFit, share > kMany ? Severity::kDoNotUse : Severity::kWarning,
         "Fixes that follow each other contradict the attitude alike and were rejected: the calibration in use does not "
         "fit the pass, or for a while the star tracker was off.",
-        fmt::format("{} of {} fixes, {} and more in a row", alike, fixes.size(), kLeast),
+        fmt::format("{} of {} fixes, {} and more in a row", alike, fixes.size(), kLeastInARow),
         "Calibrate by this pass: it tells whether alignments are others by now, as after work on the star tracker, or "
         "drift coefficients, as after a start of a rotor.");
   }
@@ -195,12 +214,12 @@ void judge_prior(const PassSettings& settings, const NavigationRun& run, std::ve
 Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   std::vector<Finding> findings;
   judge_prior(pass.settings, run, findings);
-  if (run.held_parameters_misfit && *run.held_parameters_misfit > run.misfit_limit) {
+  if (run.held_parameters_misfit && !(*run.held_parameters_misfit <= run.misfit_limit)) {
     add(findings, FindingCode::kCalibrationDoesNotFit,
         "The parameters held do not fit this pass: the calibration that ran along moved away from them by more than "
         "their sigmas allow.",
-        fmt::format("misfit {:.0f} (squared, in sigmas); 99.9 % of fitting calibrations lie below {:.0f}",
-                    *run.held_parameters_misfit, run.misfit_limit),
+        fmt::format("misfit of {} {:.0f} (squared, in sigmas); 99.9 % of fitting calibrations lie below {:.0f}",
+                    run.misfit_of, *run.held_parameters_misfit, run.misfit_limit),
         "Calibrate anew; drift coefficients change at every start of a rotor.");
   }
   judge_clocks(pass, run, findings);
@@ -208,10 +227,12 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_corrections(run, findings);
   judge_open_loops(run, findings);
   judge_rejections(run.statistics, findings);
-  judge_rejected_alike(run.fixes, findings);
   judge_widenings(run.fixes, pass.settings.epoch, findings);
   judge_star_tracker(run.statistics, findings);
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
+  if (run.held_parameters_misfit || pass.settings.prior) {
+    judge_rejected_alike(run.fixes, findings);
+  }
   judge_gyros(pass, run.gyro_events, run.gyros, " Without it there is no pair at the end of the pass, and no attitude.",
               findings);
   judge_readout_noise(run.readout_noise, findings);

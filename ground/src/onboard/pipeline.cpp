@@ -314,12 +314,13 @@ auto Pipeline::distances_from_prior() const -> std::array<DistanceFromPrior, 3> 
   }
   std::vector<Eigen::Index> all(static_cast<std::size_t>(moved.size()));
   std::iota(all.begin(), all.end(), 0);
-  const auto distance = [&](const std::vector<Eigen::Index>& states) {
+  const auto distance = [&](std::string_view of, const std::vector<Eigen::Index>& states) {
     const Eigen::VectorXd its = moved(states);
     const Eigen::MatrixXd P = program_->prior.covariance(states, states);
-    return DistanceFromPrior{its.dot(P.llt().solve(its)), static_cast<int>(states.size())};
+    return DistanceFromPrior{of, its.dot(P.llt().solve(its)), static_cast<int>(states.size())};
   };
-  return {distance(all), distance(alignments), distance(of_eq1)};
+  return {distance("all parameters", all), distance("the alignments", alignments),
+          distance("the coefficients of eq. (1)", of_eq1)};
 }
 
 Eigen::Vector3d Pipeline::apart_rad(const AttitudeSolution& attitude, const ComparedFix& its) const {

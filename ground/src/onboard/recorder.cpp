@@ -236,8 +236,7 @@ void NavigationRecorder::add_fix(const StepReport& report, const Pipeline& pipel
   if (report.corrected) {
     // All later fixes contradicted the one that started filter and navigator: it was an outlier, which tells nothing of
     // the parameters.
-    constexpr Duration kSoon = std::chrono::minutes(5);
-    if (fix.status == FixStatus::kUsedAfterReopening && corrections_.made() == 2 && fix.t - corrected_ < kSoon) {
+    if (start_unconfirmed_ && fix.status == FixStatus::kUsedAfterReopening) {
       last_compared_.clear();
     }
     corrected_ = fix.t;
@@ -247,6 +246,9 @@ void NavigationRecorder::add_fix(const StepReport& report, const Pipeline& pipel
       last_compared_.erase(last_compared_.begin());
     }
     last_compared_.push_back(pipeline.compare(*report.navigated, *report.compared));
+  }
+  if (fix.used()) {
+    start_unconfirmed_ = fix.status == FixStatus::kStarted;
   }
 }
 

@@ -16,6 +16,7 @@
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/ground/onboard/recorder.hpp"
+#include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
@@ -356,6 +357,25 @@ TEST(Navigate, IsNotForbiddenForAFirstFixThatIsAnOutlier) {
   EXPECT_TRUE(run.verdict.trustworthy);
   EXPECT_TRUE(run.verdict.has(FindingCode::kReopened));
   EXPECT_FALSE(run.verdict.has(FindingCode::kAttitudeOffFixes));
+}
+
+/// Before the pass alignments and coefficients are independent, so that the distance of all is the sum of both.
+TEST(Navigate, LooksAtAlignmentsAndCoefficientsForThemselves) {
+  const Pass& pass = two_hours().pass;
+  Pipeline pipeline(pass.settings, told());
+  replay(pass, pipeline, [](const StepReport&) {});
+  const auto [all, alignments, of_eq1] = pipeline.distances_from_prior();
+  EXPECT_EQ(all.degrees_of_freedom, 20);
+  EXPECT_EQ(alignments.degrees_of_freedom, 6);
+  EXPECT_EQ(of_eq1.degrees_of_freedom, 14);
+  EXPECT_GT(alignments.square, 0.1);
+  EXPECT_GT(of_eq1.square, 0.1);
+  EXPECT_NEAR(all.square, alignments.square + of_eq1.square, 1e-9 * all.square);
+  const NavigationRun moved = navigate_with([](Calibration& calibration) {
+    calibration.gyros[0].alignment_rotation_vector_rad.x() += 8 * sigma_of(calibration, ParameterId::alignment(0, 0));
+  });
+  EXPECT_TRUE(moved.verdict.has(FindingCode::kCalibrationDoesNotFit));
+  EXPECT_GT(*moved.held_parameters_misfit, moved.misfit_limit);
 }
 
 TEST(Navigate, WithCoefficientsTenThousandTimesTooLargeIsNotToBeUsed) {

@@ -819,9 +819,11 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
   run.misfit_limit = 45;
   run.held_parameters_misfit = 30;
   EXPECT_TRUE(verdict().trustworthy);
-  run.held_parameters_misfit = 60;
-  EXPECT_THAT(codes(verdict()), ElementsAre("calibration-does-not-fit"));
-  EXPECT_FALSE(verdict().trustworthy);
+  for (const double misfit : {60.0, std::nan("")}) {
+    run.held_parameters_misfit = misfit;
+    EXPECT_THAT(codes(verdict()), ElementsAre("calibration-does-not-fit"));
+    EXPECT_FALSE(verdict().trustworthy);
+  }
   run.held_parameters_misfit.reset();
   run.statistics.nis_mean = 40;
   EXPECT_THAT(codes(verdict()), ElementsAre("nis-out-of-bounds"));
@@ -835,6 +837,7 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
 /// larger in slews, are so to all sides.
 TEST(Verdict, OfANavigationForbidsFixesThatContradictItAlike) {
   NavigationRun run = good_navigation();
+  run.held_parameters_misfit = 0;
   const auto reject = [&](std::size_t many, double common_rad, double noise_rad) {
     run.fixes.assign(
         7200, {.status = FixStatus::kUsed, .innovation = {0, 0, 0, 0}, .innovation_sigma = {1e-4, 1e-4, 1e-4, 1e-4}});
@@ -852,11 +855,26 @@ TEST(Verdict, OfANavigationForbidsFixesThatContradictItAlike) {
   const Verdict remounted = reject(1000, 1e-3, 2e-4);
   EXPECT_THAT(codes(remounted), ElementsAre("calibration-does-not-fit"));
   EXPECT_FALSE(remounted.trustworthy);
-  EXPECT_EQ(remounted.findings.at(0).evidence, "1000 of 7200 fixes, 5 and more in a row");
+  EXPECT_EQ(remounted.findings.at(0).evidence, "1000 of 7200 fixes, 8 and more in a row");
   EXPECT_TRUE(reject(200, 1e-3, 2e-4).trustworthy);
   EXPECT_THAT(codes(reject(200, 1e-3, 2e-4)), ElementsAre("calibration-does-not-fit"));
   EXPECT_THAT(codes(reject(40, 1e-3, 2e-4)), IsEmpty());
   EXPECT_THAT(codes(reject(1000, 0, 1e-3)), IsEmpty());
+  // Nothing is held, and no calibration is in use.
+  static_cast<void>(reject(1000, 1e-3, 2e-4));
+  run.held_parameters_misfit.reset();
+  EXPECT_THAT(codes(judge_navigation(good_pass(), run)), IsEmpty());
+  run.held_parameters_misfit = 0;
+  // Contradict one that started the filter, which was an outlier.
+  for (FixRecord& fix : run.fixes) {
+    const bool before_row = fix.status == FixStatus::kUsed && (&fix + 1)->status == FixStatus::kRejectedByGate;
+    const bool after_row = fix.status == FixStatus::kUsed && (&fix - 1)->status == FixStatus::kRejectedByGate;
+    fix.status = before_row ? FixStatus::kStarted : after_row ? FixStatus::kUsedAfterReopening : fix.status;
+    if (&fix == &run.fixes.back() - 1) {
+      break;
+    }
+  }
+  EXPECT_THAT(codes(judge_navigation(good_pass(), run)), IsEmpty());
   static_cast<void>(reject(1000, 1e-3, 2e-4));
   for (FixRecord& fix : run.fixes) {
     fix.jumped = true;  // the star tracker's fault, which is told otherwise

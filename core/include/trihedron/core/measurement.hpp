@@ -73,7 +73,9 @@ template <class Gyros>
     const Eigen::Vector3d& h = gyros[k].h_in;
     const Eigen::Vector3d normal = h.cross(gyros[(k + 1) % layout.gyros].h_in);
     GyroComparison& its = comparison.gyros[k];
-    its.by_phi.row(0) = (normal.squaredNorm() > 0 ? normal.normalized() : h.unitOrthogonal()).transpose();
+    // Any axis across h does; that of momenta on one line would be made of rounding.
+    constexpr double kOnOneLine = 1e-20;
+    its.by_phi.row(0) = (normal.squaredNorm() > kOnOneLine ? normal.normalized() : h.unitOrthogonal()).transpose();
     its.by_phi.row(1) = h.cross(its.by_phi.row(0).transpose()).transpose();
     its.by_fix = its.by_phi * C_linear;
     its.y = its.by_phi * h.cross(C_in_c * gyros[k].in_c(h_b[k]));

@@ -252,9 +252,11 @@ struct NavigationRun {
   std::vector<OpenLoopEnd> open_loops;            ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
-  /// its 99.9 % limit; of all of them, of the alignments or of the coefficients of eq. (1), whichever is worst.
+  /// its 99.9 % limit; of all of them, of the alignments or of the coefficients of eq. (1), whichever is largest
+  /// against its limit.
   std::optional<double> held_parameters_misfit;
   double misfit_limit = 0;
+  std::string misfit_of = "all parameters";
   std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end; nothing without a pair there
   Verdict verdict;
 };

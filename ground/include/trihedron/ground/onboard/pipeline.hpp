@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -69,6 +70,7 @@ class Pipeline {
   [[nodiscard]] Held held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d& covariance_rad2) const;
   /// (estimated − prior)ᵀ P⁻¹ (estimated − prior), P the covariance of the prior.
   struct DistanceFromPrior {
+    std::string_view of;  ///< in words
     double square = 0;
     int degrees_of_freedom = 0;
   };

@@ -102,6 +102,7 @@ class NavigationRecorder {
   Time corrected_{};
   GyroEvents gyros_;
   CorrectionSums corrections_;
+  bool start_unconfirmed_ = false;          ///< the last fix that was used started the filter
   std::vector<OpenLoopEnd> last_compared_;  ///< of each of the last fixes since the last correction
 };
 
