@@ -866,12 +866,12 @@ TEST(Verdict, OfANavigationForbidsFixesThatContradictItAlike) {
   EXPECT_THAT(codes(judge_navigation(good_pass(), run)), IsEmpty());
   run.held_parameters_misfit = 0;
   // Contradict one that started the filter, which was an outlier.
-  for (FixRecord& fix : run.fixes) {
-    const bool before_row = fix.status == FixStatus::kUsed && (&fix + 1)->status == FixStatus::kRejectedByGate;
-    const bool after_row = fix.status == FixStatus::kUsed && (&fix - 1)->status == FixStatus::kRejectedByGate;
-    fix.status = before_row ? FixStatus::kStarted : after_row ? FixStatus::kUsedAfterReopening : fix.status;
-    if (&fix == &run.fixes.back() - 1) {
-      break;
+  std::vector<FixRecord>& fixes = run.fixes;
+  for (std::size_t i = 1; i + 1 < fixes.size(); ++i) {
+    if (fixes[i].status == FixStatus::kRejectedByGate && fixes[i - 1].status == FixStatus::kUsed) {
+      fixes[i - 1].status = FixStatus::kStarted;
+    } else if (fixes[i].status == FixStatus::kUsed && fixes[i - 1].status == FixStatus::kRejectedByGate) {
+      fixes[i].status = FixStatus::kUsedAfterReopening;
     }
   }
   EXPECT_THAT(codes(judge_navigation(good_pass(), run)), IsEmpty());
