@@ -217,6 +217,18 @@ TEST(CampaignSummary, NamesWhyRunsAreRefused) {
   EXPECT_THAT(evidence(), testing::HasSubstr("most often gyro-stuck, in 1 of these"));
 }
 
+TEST(CampaignSummary, NamesTheSecondOfTwoWords) {
+  CampaignInput input;
+  input.key = "attitude.slews";
+  EXPECT_EQ(influential(input), "attitude.slews");
+  input.distribution.kind = Distribution::Kind::kChoice;
+  input.distribution.options = 2;
+  input.options = {"auto", "none"};
+  EXPECT_EQ(influential(input), "attitude.slews = none");
+  input.numbers = {1, 2};
+  EXPECT_EQ(influential(input), "attitude.slews");
+}
+
 TEST(CampaignSummary, FindsWhatMatters) {
   const CampaignSummary summary = summarise(plan_of(100), runs_of(100));
   ASSERT_FALSE(summary.influences.empty());

@@ -851,7 +851,14 @@ def test_advice_can_be_pasted_and_is_confirmed(observe):
     for combination in advice["combinations"]:
         assert combination["sigma_after"] < combination["sigma_before"] / 100
         assert combination["sigma_simulated"] > 0
-    assert advice["confirmation"]["runs"] == 2
+    assert advice["confirmation"]["runs"] == 2 and not advice["confirmation"]["contradicted"]
+
+
+def test_flights_that_contradict_a_plan_are_told(observe, tmp_path):
+    flown = STEADY.replace("{slews}", '"none"').replace('outside_sigma = "0rad/s"', 'outside_sigma = "1e-7rad/s"')
+    (tmp_path / "flown.toml").write_text(flown)
+    result = observe("--advise", "--slews", "1", "--manoeuvre-time", "8min", "--confirm", "2", of=tmp_path / "flown.toml")
+    assert result.returncode == DO_NOT_USE and "The flights CONTRADICT the prediction" in result.stdout
 
 
 @pytest.mark.parametrize("limit, value, cure", [

@@ -42,6 +42,9 @@ Field name_of_something(std::string_view key, std::string& target, std::string_v
   });
 }
 
+/// Without the sign that it is taken with.
+std::string column_of(const std::string& name) { return name.starts_with('-') ? name.substr(1) : name; }
+
 /// So many names.
 Field column_names(std::string_view key, std::vector<std::string>& target, std::size_t count, std::string_view about) {
   const auto schema = [count] {
@@ -59,7 +62,7 @@ Field column_names(std::string_view key, std::vector<std::string>& target, std::
             target.clear();
             for (const toml::node& element : *array) {
               std::string name = table.text(element, key);
-              const std::string bare = name.starts_with('-') ? name.substr(1) : name;
+              const std::string bare = column_of(name);
               if (bare.empty()) {
                 table.refuse(element, fmt::format("\"{}\" has a name that is empty", key), "give the name");
               }
@@ -267,11 +270,10 @@ Fields gyro_fields(GyroMap& map, const fs::path& file) {
     std::map<std::string, std::size_t> gyro_of;
     for (std::size_t k = 0; k < map.units.size(); ++k) {
       for (const std::string& name : map.units[k].columns) {
-        const std::string bare = name.starts_with('-') ? name.substr(1) : name;
-        if (const auto [its, is_new] = gyro_of.try_emplace(bare, k); !is_new) {
+        if (const auto [its, is_new] = gyro_of.try_emplace(column_of(name), k); !is_new) {
           table.refuse(
               (*node.as_array())[k],
-              fmt::format("column {} is that of gyro {} and of gyro {}", in_quotes(bare), its->second + 1, k + 1),
+              fmt::format("column {} is that of gyro {} and of gyro {}", in_quotes(its->first), its->second + 1, k + 1),
               "name for each gyro the columns that it has for itself");
         }
       }

@@ -38,7 +38,7 @@ constexpr const char* kLookAtCalibration =
 /// tracker in slews, are to all sides; where the parameters in use, or the star tracker, are off they are alike. Not
 /// those that contradict a first fix, which was an outlier then.
 long rejected_alike(const std::vector<FixRecord>& fixes, long least_in_a_row) {
-  constexpr double kAlike = 0.5;
+  constexpr double kAlike = 0.5;  // R, the square of the mean over the mean square
   struct Row {
     long fixes = 0;
     Eigen::VectorXd sum;
@@ -79,10 +79,12 @@ long rejected_alike(const std::vector<FixRecord>& fixes, long least_in_a_row) {
 /// Whether fixes contradict the calibration that a navigation began with. Where they contradict one gyro alone, that is
 /// told already.
 void judge_rejected_alike(const std::vector<FixRecord>& fixes, std::vector<Finding>& findings) {
+  // Of so many, independent errors are alike in one row of 2000 (four components, R ~ Beta(2, 14)), and in one of 30
+  // where all are about one axis.
   constexpr long kLeastInARow = 8;
-  constexpr long kLeast = 40;
+  constexpr long kLeast = 40;  // twice as many as it takes to reopen the filter
   constexpr double kSome = 0.01;
-  constexpr double kMany = 0.05;
+  constexpr double kMany = 0.05;  // from which on `many-rejected` is told
   const long alike = rejected_alike(fixes, kLeastInARow);
   const double share = static_cast<double>(alike) / static_cast<double>(std::max(fixes.size(), std::size_t{1}));
   const bool is_told = std::ranges::find(findings, FindingCode::kGyroContradicted, &Finding::code) != findings.end();

@@ -359,6 +359,20 @@ TEST(Navigate, IsNotForbiddenForAFirstFixThatIsAnOutlier) {
   EXPECT_FALSE(run.verdict.has(FindingCode::kAttitudeOffFixes));
 }
 
+/// As after work on the star tracker: a degree about the orbit normal, which only slews show.
+TEST(Navigate, IsForbiddenWhereTheStarTrackerWasRemounted) {
+  Pass pass = two_hours().pass;
+  CalibrationOptions options = told();
+  pass.settings.prior = calibrate(pass, options).calibration;
+  options.corrections = {CorrectionOptions::When::kEvery, minutes(30), false};
+  for (Eigen::Quaterniond& q_in_c : pass.star_tracker.q_in_c) {
+    q_in_c *= Eigen::Quaterniond(Eigen::AngleAxisd(kDegree, Eigen::Vector3d::UnitY()));
+  }
+  const NavigationRun run = navigate(pass, options);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kCalibrationDoesNotFit));
+  EXPECT_FALSE(run.verdict.trustworthy);
+}
+
 /// Before the pass alignments and coefficients are independent, so that the distance of all is the sum of both.
 TEST(Navigate, LooksAtAlignmentsAndCoefficientsForThemselves) {
   const Pass& pass = two_hours().pass;

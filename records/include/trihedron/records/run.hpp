@@ -256,7 +256,7 @@ struct NavigationRun {
   /// against its limit.
   std::optional<double> held_parameters_misfit;
   double misfit_limit = 0;
-  std::string misfit_of = "all parameters";
+  std::string misfit_of;                     ///< which of these
   std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end; nothing without a pair there
   Verdict verdict;
 };
