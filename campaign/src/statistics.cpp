@@ -78,6 +78,35 @@ bool is_share_above(std::size_t count, std::size_t of, double share, double conf
                                                                static_cast<double>(count) - 1)) < 1 - confidence;
 }
 
+std::vector<double> order_scores(std::span<const double> values, std::span<const char> is_lower_bound) {
+  std::vector<double> known;
+  std::vector<double> bounds;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isnan(values[i])) {
+      (is_lower_bound[i] != 0 ? bounds : known).push_back(values[i]);
+    }
+  }
+  std::ranges::sort(known);
+  std::ranges::sort(bounds);
+  const auto from = [](const std::vector<double>& sorted, auto first) { return sorted.end() - first; };
+  std::vector<double> scores(values.begin(), values.end());  // NaN stays
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double value = values[i];
+    if (std::isnan(value)) {
+      continue;
+    }
+    if (is_lower_bound[i] != 0) {
+      scores[i] = static_cast<double>(std::ranges::upper_bound(known, value) - known.begin());
+      continue;
+    }
+    const std::ptrdiff_t below = std::ranges::lower_bound(known, value) - known.begin();
+    const std::ptrdiff_t above =
+        from(known, std::ranges::upper_bound(known, value)) + from(bounds, std::ranges::lower_bound(bounds, value));
+    scores[i] = static_cast<double>(below - above);
+  }
+  return scores;
+}
+
 std::optional<RankCorrelation> rank_correlation(std::span<const double> x, std::span<const double> y) {
   std::vector<double> first;
   std::vector<double> second;

@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "trihedron/campaign/sampling.hpp"
 #include "trihedron/records/parameter_id.hpp"
 
 namespace trihedron::campaign {
@@ -77,10 +78,12 @@ constexpr std::array<Measure, 11> kMeasures = {{
      true, [](const RunRecord& record) { return or_infinite(record, record.at(RunQuantity::kAlignmentSettled)); }},
     {"interval_after", "Correction interval",
      "median time by the gyros alone, with the calibrated parameters, until the attitude error passes the limit",
-     Measure::Unit::kSecond, false, [](const RunRecord& record) { return record.at(RunQuantity::kIntervalAfter); }},
+     Measure::Unit::kSecond, false, [](const RunRecord& record) { return record.at(RunQuantity::kIntervalAfter); },
+     [](const RunRecord& record) { return record.at(RunQuantity::kIntervalAfterIsLowerBound) == 1; }},
     {"extension", "Extension of the correction interval",
      "correction interval with the calibrated parameters, in multiples of that with the parameters known before",
-     Measure::Unit::kRatio, false, [](const RunRecord& record) { return record.at(RunQuantity::kExtension); }},
+     Measure::Unit::kRatio, false, [](const RunRecord& record) { return record.at(RunQuantity::kExtension); },
+     [](const RunRecord& record) { return record.at(RunQuantity::kExtensionIsLowerBound) == 1; }},
 }};
 
 using Records = std::vector<const RunRecord*>;
@@ -209,7 +212,45 @@ bool has_order(const CampaignInput& input) {
          (input.is_number() || input.distribution.options == 2);
 }
 
+/// A measure of all runs, in their order.
+std::vector<double> scores_of(const Measure& measure, const Records& records) {
+  std::vector<double> values;
+  std::vector<char> is_lower_bound;
+  for (const RunRecord* record : records) {
+    values.push_back(measure.of(*record));
+    is_lower_bound.push_back(measure.is_lower_bound != nullptr && measure.is_lower_bound(*record) ? 1 : 0);
+  }
+  return order_scores(values, is_lower_bound);
+}
+
+/// The mean of each flight over its runs that have a number; NaN where none has. Records of runs in increasing order.
+std::vector<double> means_of_flights(const CampaignPlan& plan, const Records& records,
+                                     const std::vector<double>& of_runs) {
+  std::map<std::uint64_t, std::pair<double, double>> flights;  // sums and their numbers
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (!std::isnan(of_runs[i])) {
+      auto& [sum, count] = flights[flight_of_run(plan, records[i]->run)];
+      sum += of_runs[i];
+      count += 1;
+    }
+  }
+  std::vector<double> means(records.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    // At its first run, so that each flight counts once.
+    if (const auto flight = flights.extract(flight_of_run(plan, records[i]->run)); !flight.empty()) {
+      means[i] = flight.mapped().first / flight.mapped().second;
+    }
+  }
+  return means;
+}
+
 void find_influences(const CampaignPlan& plan, const Records& records, CampaignSummary& summary) {
+  std::vector<std::vector<double>> of_runs;
+  std::vector<std::vector<double>> of_flights;
+  for (const Measure& measure : kMeasures) {
+    of_runs.push_back(scores_of(measure, records));
+    of_flights.push_back(means_of_flights(plan, records, of_runs.back()));
+  }
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     if (!has_order(plan.inputs[i])) {
       continue;
@@ -218,14 +259,11 @@ void find_influences(const CampaignPlan& plan, const Records& records, CampaignS
     for (const RunRecord* record : records) {
       drawn.push_back(plan.inputs[i].shown(record->draws[i]));
     }
-    for (const Measure& measure : kMeasures) {
-      std::vector<double> values;
-      for (const RunRecord* record : records) {
-        values.push_back(measure.of(*record));
-      }
-      if (const auto correlation = rank_correlation(drawn, values)) {
+    for (std::size_t k = 0; k < kMeasures.size(); ++k) {
+      if (const auto correlation =
+              rank_correlation(drawn, plan.inputs[i].is_setting() ? of_runs[k] : of_flights[k])) {
         ++summary.pairs;
-        summary.influences.push_back({i, &measure, *correlation, false});
+        summary.influences.push_back({i, &kMeasures.at(k), *correlation, false});
       }
     }
   }

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -76,6 +79,22 @@ TEST(RankCorrelation, IsNoneForFewPairsOrWhatDoesNotChange) {
   EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3}, std::vector<double>{1, 2, 3}).has_value());
   EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3, nan}, std::vector<double>{1, 2, 3, 4}).has_value());
   EXPECT_FALSE(rank_correlation(std::vector<double>{5, 5, 5, 5}, std::vector<double>{1, 2, 3, 4}).has_value());
+}
+
+TEST(OrderScores, AreTheOrderOfTheRanksWhereAllIsKnown) {
+  const std::vector<double> values = {5, 1, 5, 9};
+  EXPECT_THAT(order_scores(values, std::vector<char>(4)), testing::ElementsAre(0, -3, 0, 3));
+}
+
+/// 3 is below 5 and above 1. That something is more than 2 does not say whether it is more than 3 or 5.
+TEST(OrderScores, OfALowerBoundCountOnlyWhatIsSurelyBelowIt) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> values = {1, 3, 5, 2, nan, 5};
+  const std::vector<char> is_lower_bound = {0, 0, 0, 1, 1, 1};
+  const std::vector<double> scores = order_scores(values, is_lower_bound);
+  EXPECT_THAT(std::vector<double>(scores.begin(), scores.begin() + 4), testing::ElementsAre(-4, -1, 1, 1));
+  EXPECT_TRUE(std::isnan(scores[4]));
+  EXPECT_EQ(scores[5], 3);
 }
 
 TEST(ChiSquareBounds, AreThoseOfTheTable) {
@@ -235,6 +254,55 @@ TEST(CampaignSummary, FindsWhatMatters) {
   EXPECT_EQ(summary.influences.front().measure->key, "open_loop_error");
   EXPECT_EQ(summary.influences.front().correlation.rho, 1);
   EXPECT_TRUE(summary.influences.front().is_significant);
+}
+
+/// Of longer passes the bounds are higher, and nothing else.
+TEST(CampaignSummary, DoesNotTakeLowerBoundsForValues) {
+  std::vector<RunRecord> records = runs_of(100);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    records[i][RunQuantity::kExtension] = {i % 2 == 0 ? 10.0 : 20.0 + static_cast<double>(i)};
+    records[i][RunQuantity::kExtensionIsLowerBound] = {i % 2 == 0 ? 0.0 : 1.0};
+    records[i].draws = {static_cast<double>(i % 2 == 0 ? 0 : i)};
+  }
+  const auto of_extension = [&] {
+    const CampaignSummary summary = summarise(plan_of(100), records);
+    const auto found = std::ranges::find_if(
+        summary.influences, [](const Influence& influence) { return influence.measure->key == "extension"; });
+    return found != summary.influences.end() ? std::optional(found->correlation.rho) : std::nullopt;
+  };
+  const std::optional<double> both = of_extension();  // all that is drawn above 0 has more than 10
+  ASSERT_TRUE(both.has_value());
+  EXPECT_NEAR(*both, std::sqrt(62500 / 72912.5), 1e-12);  // 50 below and 50 above, and no order among these
+  for (RunRecord& record : records) {
+    record[RunQuantity::kExtensionIsLowerBound] = {1};
+  }
+  EXPECT_FALSE(of_extension().has_value());  // bounds alone say nothing
+}
+
+/// Each flight by three settings, which change nothing: as many independent numbers as flights.
+TEST(CampaignSummary, CountsAFlightOnceForWhatIsDrawnOfTheScenario) {
+  CampaignPlan plan = plan_of(30);
+  plan.inputs.front().distribution = {.kind = Distribution::Kind::kUniform, .a = 0, .b = 10};
+  CampaignInput setting;
+  setting.key = "calibration.filter.gate";
+  setting.distribution = {.kind = Distribution::Kind::kGrid, .options = 3};
+  setting.options = {"1", "2", "3"};
+  setting.numbers = {1, 2, 3};
+  plan.inputs.push_back(setting);
+  std::vector<RunRecord> records = runs_of(30);
+  for (RunRecord& record : records) {
+    const std::uint64_t flight = record.run % 10;
+    record.draws = {static_cast<double>(flight), static_cast<double>(record.run / 10)};
+    record[RunQuantity::kOpenLoopError] = {1e-4 * static_cast<double>(flight * flight)};
+  }
+  const CampaignSummary summary = summarise(plan, records);
+  std::map<std::size_t, std::size_t> count;
+  for (const Influence& influence : summary.influences) {
+    if (influence.measure->key == "open_loop_error") {
+      count[influence.input] = influence.correlation.count;
+    }
+  }
+  EXPECT_THAT(count, testing::ElementsAre(testing::Pair(0, 10), testing::Pair(1, 30)));
 }
 
 TEST(CampaignSummary, CountsWhatHasNotSettledAsLaterThanAll) {

@@ -288,7 +288,9 @@ ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summ
   }
   ordered_json influences = ordered_json::array();
   for (const campaign::Influence& influence : summary.influences) {
-    influences.push_back({{"key", plan.inputs[influence.input].key},
+    const CampaignInput& input = plan.inputs[influence.input];
+    influences.push_back({{"key", input.key},
+                          {"word", input.is_number() ? ordered_json() : ordered_json(input.options.back())},
                           {"measure", influence.measure->key},
                           {"runs", influence.correlation.count},
                           {"rank_correlation", influence.correlation.rho},

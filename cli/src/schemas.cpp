@@ -330,7 +330,9 @@ Json campaign_output() {
                                  {"normalised_rms", number()},
                                  {"usual_low", number()},
                                  {"usual_high", number()}});
+  const Json word = {{"type", Json::array({"string", "null"})}};  // null: a number
   const Json influence = object({{"key", text()},
+                                 {"word", word},
                                  {"measure", text()},
                                  {"runs", count()},
                                  {"rank_correlation", number()},

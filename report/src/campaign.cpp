@@ -433,7 +433,7 @@ json heatmap_of(const CampaignReportInput& input) {
       marks.push_back(is_there && found->is_significant ? signed_number(found->correlation.rho, 2) : "");
     }
     if (any) {
-      keys.push_back(input.plan.inputs[i].key);
+      keys.push_back(campaign::influential(input.plan.inputs[i]));
       rows.push_back(row);
       significant_rows.push_back(marks);
     }

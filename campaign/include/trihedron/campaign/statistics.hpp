@@ -33,6 +33,12 @@ struct QuantileBounds {
 /// 1934).
 [[nodiscard]] bool is_share_above(std::size_t count, std::size_t of, double share, double confidence = kConfidence);
 
+/// Of each value, how many others are surely below it less how many are surely above (E. A. Gehan 1965, by N. Mantel
+/// 1967). Where all are known, the same order as the ranks, with mean ranks for equal values. A lower bound, which the
+/// value itself exceeds, is surely above what is not above it, and surely below nothing. NaN for NaN, which does not
+/// count; infinity is a value. is_lower_bound: as many.
+[[nodiscard]] std::vector<double> order_scores(std::span<const double> values, std::span<const char> is_lower_bound);
+
 /// Spearman's rank correlation, with mean ranks for equal values.
 struct RankCorrelation {
   double rho = 0;

@@ -27,6 +27,8 @@ struct Measure {
   bool large_is_bad = true;
   /// NaN where a run has none; infinity where it did not get there.
   double (*of)(const RunRecord& record) = nullptr;
+  /// Whether that is a lower bound: the pass ended before. Null where it never is.
+  bool (*is_lower_bound)(const RunRecord& record) = nullptr;
 };
 
 /// nees, alignment_error (largest of all gyros), attitude_rms, navigation_error, corrected_error, open_loop_error,
@@ -81,6 +83,8 @@ struct ParameterErrors {
 struct Influence {
   std::size_t input = 0;  ///< of CampaignPlan::inputs
   const Measure* measure = nullptr;
+  /// Of runs; for a value of the scenario, of flights, each with the mean of its runs by all settings: runs of one
+  /// flight are not independent.
   RankCorrelation correlation;
   bool is_significant = false;  ///< by chance in 5 % of campaigns at most one of all pairs would be
 };
