@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "trihedron/records/fnv1a.hpp"
 #include "trihedron/sim/random.hpp"
 
 namespace trihedron::campaign {
@@ -13,15 +14,6 @@ namespace {
 
 /// The largest number below it: by rounding, a number that is drawn may be 1.
 constexpr double kBelowOne = 1 - 0x1p-53;
-
-/// FNV-1a.
-std::uint64_t hash_of(std::string_view text) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const char c : text) {
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  }
-  return hash;
-}
 
 /// Each part is mixed before the next is added, so that neighbouring seeds and runs give unrelated numbers.
 std::uint64_t mixed(std::uint64_t seed, std::uint64_t run, std::uint64_t what) {
@@ -75,11 +67,11 @@ std::uint64_t flights_of(const CampaignPlan& plan) { return plan.runs / grid_poi
 std::uint64_t flight_of_run(const CampaignPlan& plan, std::uint64_t run) { return run % flights_of(plan); }
 
 std::uint64_t seed_of_run(const CampaignPlan& plan, std::uint64_t run) {
-  return mixed(plan.seed, flight_of_run(plan, run), hash_of("scenario.seed")) >> 1U;
+  return mixed(plan.seed, flight_of_run(plan, run), fnv1a("scenario.seed")) >> 1U;
 }
 
 double uniform_of(std::uint64_t seed, std::uint64_t flight, std::string_view key) {
-  return std::min((static_cast<double>(mixed(seed, flight, hash_of(key)) >> 11U) + 0.5) * 0x1p-53, kBelowOne);
+  return std::min((static_cast<double>(mixed(seed, flight, fnv1a(key)) >> 11U) + 0.5) * 0x1p-53, kBelowOne);
 }
 
 double quantile_of(const Distribution& distribution, double u) {
@@ -144,7 +136,7 @@ std::vector<double> draws_of_run(const CampaignPlan& plan, std::uint64_t run) {
     }
     double u = uniform_of(plan.seed, flight, input.key);
     if (plan.latin_hypercube) {
-      const std::uint64_t stratum = permuted(flight, flights, mixed(plan.seed, 0, hash_of("order of " + input.key)));
+      const std::uint64_t stratum = permuted(flight, flights, mixed(plan.seed, 0, fnv1a("order of " + input.key)));
       u = std::min((static_cast<double>(stratum) + u) / static_cast<double>(flights), kBelowOne);
     }
     draws.push_back(quantile_of(input.distribution, u));

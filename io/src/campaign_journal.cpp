@@ -16,6 +16,7 @@
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/campaign.hpp"
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/fnv1a.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -93,14 +94,12 @@ CampaignIdentity identity_of(const Json& json, const fs::path& file) {
 }  // namespace
 
 std::string digest_of(const CampaignIdentity& identity) {
-  // FNV-1a: nobody makes two campaigns alike on purpose, and the texts themselves are compared.
-  std::uint64_t hash = 0xcbf29ce484222325;
+  // Nobody makes two campaigns alike on purpose, and the texts themselves are compared.
+  std::string text;
   for (const IdentityLine& line : identity) {
-    for (const char c : line.key + '\0' + line.text + '\0') {
-      hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-    }
+    text += line.key + '\0' + line.text + '\0';
   }
-  return fmt::format("{:016x}", hash);
+  return fmt::format("{:016x}", fnv1a(text));
 }
 
 std::string difference_between(const CampaignIdentity& before, const CampaignIdentity& now) {
