@@ -66,7 +66,8 @@ uint32_t trihedron_on_gyro(trihedron_application* its, const trihedron_gyro_samp
 
 /**
  * One fix: of `trihedron_fix`, of this fix, or of one before it where they come so fast that it is dealt with now. It waits
- * for the samples round it; `last_fix` of the housekeeping record then says what was done with it.
+ * for the samples round it; `last_fix` of the housekeeping record then says what was done with it. A fix whose time is more than
+ * 1.4 s before that of the latest sample comes too late, since its samples have been passed: rejected_out_of_order.
  */
 uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* fix);
 

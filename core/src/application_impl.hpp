@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "forecast_impl.hpp"
 #include "trihedron/core/application.hpp"
@@ -157,6 +158,9 @@ void Application<Estimator>::begin() {
   forecast_ = Forecast<Estimator>(policy_.window, policy_.required_interval, policy_.required_error_rad);
   calibration_residuals_.restart();
   navigation_residuals_.restart();
+  angle_sigma_rad_ = std::numeric_limits<double>::infinity();
+  angle_off_rad_ = fixes_off_rad_ = 0;
+  fixes_to_agree_ = angle_run_ = 0;
   faults_ = 0;
   fixes_since_start_ = 0;
   refused_in_a_row_ = 0;
@@ -190,6 +194,9 @@ StepReport Application<Estimator>::on_gyro(const GyroSample& sample) {
   }
   const StepReport report = on_board_.on_gyro(sample);
   note(report);
+  if (is_used(report.sample)) {
+    note_angles(report, sample.h_b);
+  }
   return report;
 }
 
@@ -226,7 +233,9 @@ void Application<Estimator>::note_sample(const StepReport& report) {
   if (!is_used(report.sample)) {
     detail::count_up(counts_.samples_rejected);
     refused_in_a_row_ = std::min(refused_in_a_row_ + 1, kStandingStill);
-    now_ = report.sample == SampleStatus::kRejectedOutOfOrder ? now_ : report.t;
+    if (report.sample != SampleStatus::kRejectedOutOfOrder) {
+      note_time_of_refused(report);
+    }
     return;
   }
   detail::count_up(counts_.samples_used);
@@ -235,8 +244,8 @@ void Application<Estimator>::note_sample(const StepReport& report) {
   if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
     detail::count_up(counts_.clock_set_backs);
     const Duration shift = report.t - used_t_;
-    fix_t_ += shift;
-    attitude_t_ += shift;
+    fix_t_ = shifted(fix_t_, shift);
+    attitude_t_ = shifted(attitude_t_, shift);
     set(Fault::kClockSetBack, on_board_.navigator().started());
     unknown_until_ = report.t;
   } else if (has_sample_ && report.t - used_t_ > kLongGap) {
@@ -251,8 +260,67 @@ void Application<Estimator>::note_sample(const StepReport& report) {
   now_ = used_t_ = report.t;
 }
 
+/// A time without samples does not count as one without attitude; nor does one that a single refused sample may have
+/// wrong.
+template <class Estimator>
+void Application<Estimator>::note_time_of_refused(const StepReport& report) {
+  if (!has_sample_) {
+    now_ = used_t_ = fix_t_ = attitude_t_ = report.t;
+    has_sample_ = true;
+  } else if (const Duration ahead = report.t - now_; ahead <= kLongGap) {
+    now_ = report.t;
+  } else if (refused_in_a_row_ >= kStandingStill) {
+    now_ = report.t;
+    attitude_t_ = shifted(attitude_t_, ahead);
+  }
+}
+
+/// Of all pairs of gyros in use.
+template <class Estimator>
+double Application<Estimator>::largest_angle_off_rad(const StepReport& report, const Directions& h_b) const {
+  const auto& its = on_board_.estimator().gyros();
+  double largest = 0;
+  for (int k = 0; k < gyros(); ++k) {
+    for (int j = k + 1; j < gyros(); ++j) {
+      if (report.gyros[k] == GyroState::kUsed && report.gyros[j] == GyroState::kUsed) {
+        const double cosine = its[k].h_in.dot(its[j].h_in);
+        const double off = cosine - its[k].in_c(h_b[k]).dot(its[j].in_c(h_b[j]));
+        largest = std::max(largest, std::abs(off) / std::sqrt(1 - cosine * cosine));
+      }
+    }
+  }
+  return largest;
+}
+
+/// Whether gyros contradict each other, whatever the star tracker says. A few samples in a row tell that they do, and
+/// as many as show that nothing is read that they no longer do.
+template <class Estimator>
+void Application<Estimator>::note_angles(const StepReport& report, const Directions& h_b) {
+  constexpr int kToContradict = 4;
+  if (!on_board_.estimator().started()) {
+    return;
+  }
+  const double off_rad = largest_angle_off_rad(report, h_b);
+  double square = angle_sigma_rad_ * angle_sigma_rad_;
+  for (int k = 0; k < gyros(); ++k) {
+    const double noise_rad = on_board_.estimator().setup().readout_noise_rad[k];
+    square += noise_rad * noise_rad;
+  }
+  const bool is_off = off_rad > FixReport::kContradiction * std::sqrt(square);
+  const bool is_told = has(Fault::kGyrosContradict);
+  angle_run_ = is_off == is_told ? 0 : angle_run_ + 1;
+  if (angle_run_ >= (is_told ? kStandingStill : kToContradict)) {
+    set(Fault::kGyrosContradict, is_off);
+    angle_run_ = 0;
+  }
+  angle_off_rad_ = has(Fault::kGyrosContradict) ? std::max(angle_off_rad_, off_rad) : 0;
+}
+
 template <class Estimator>
 void Application<Estimator>::note_fix(const StepReport& report) {
+  if (report.fix.angle_sigma_rad > 0) {
+    angle_sigma_rad_ = report.fix.angle_sigma_rad;
+  }
   if (report.fix.status == FixStatus::kEstimateLost || report.angles.status == FixStatus::kEstimateLost) {
     restart();
   }
@@ -279,6 +347,7 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
     set(Fault::kGap, false);
   }
   set(Fault::kAccuracy, false);
+  note_contradiction(report.fix);
   if (report.corrected) {
     detail::count_up(counts_.corrections);
     navigation_residuals_.restart();
@@ -318,6 +387,22 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
   }
 }
 
+/// Where fixes that contradicted an adopted calibration are followed in the end, it may be the star tracker that is
+/// off. As many as it takes to believe them against a jump have to agree. Gyros that contradict each other explain it.
+template <class Estimator>
+void Application<Estimator>::note_contradiction(const FixReport& report) {
+  const bool is_followed = report.status == FixStatus::kUsedAfterReopening || report.status == FixStatus::kRestarted;
+  const bool was_adopted = adoption_ == Adoption::kDone || has(Fault::kFixesContradict);
+  if (is_followed && was_adopted && !has(Fault::kGyrosContradict)) {
+    fixes_off_rad_ = std::max(fixes_off_rad_, report.innovation.norm());
+    fixes_to_agree_ = on_board_.estimator().setup().reopen_after_jump_rejections;
+  } else if (fixes_to_agree_ > 0) {
+    --fixes_to_agree_;
+  }
+  set(Fault::kFixesContradict, fixes_to_agree_ > 0);
+  fixes_off_rad_ = fixes_to_agree_ > 0 ? fixes_off_rad_ : 0;
+}
+
 /// How far the open loop was off at a fix.
 template <class Estimator>
 void Application<Estimator>::note_navigated(const StepReport& report) {
@@ -350,6 +435,7 @@ void Application<Estimator>::restart() {
   withdraw();
   happen(Event::kFilterRestarted);
   fixes_since_start_ = 0;
+  angle_sigma_rad_ = std::numeric_limits<double>::infinity();
 }
 
 /// At the next fix that is used.
@@ -433,7 +519,8 @@ template <class Estimator>
 bool Application<Estimator>::is_degraded() const {
   const bool needs_star_tracker = mode_ != Mode::kNavigating;
   return has(Fault::kNoAttitude) || has(Fault::kGyroLost) || has(Fault::kClockSetBack) || has(Fault::kGap) ||
-         has(Fault::kAccuracy) || (needs_star_tracker && has(Fault::kStarTrackerLost));
+         has(Fault::kAccuracy) || has(Fault::kGyrosContradict) || has(Fault::kFixesContradict) ||
+         (needs_star_tracker && has(Fault::kStarTrackerLost));
 }
 
 // ---- What comes out
@@ -444,7 +531,15 @@ std::optional<AttitudeSolution> Application<Estimator>::attitude() const {
     return std::nullopt;
   }
   const auto solution = on_board_.navigation_attitude();
-  return solution ? std::optional(solution.value()) : std::nullopt;
+  if (!solution) {
+    return std::nullopt;
+  }
+  // A momentum that has moved to the side is off by more than the angle shows.
+  constexpr double kOverAngle = 10;
+  AttitudeSolution its = solution.value();
+  const double off_rad = kOverAngle * angle_off_rad_;
+  its.covariance_rad2.diagonal().array() += off_rad * off_rad + fixes_off_rad_ * fixes_off_rad_;
+  return its;
 }
 
 template <class Estimator>

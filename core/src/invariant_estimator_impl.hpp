@@ -503,16 +503,46 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
   }
 }
 
+/// The angles between the momenta as they are read, against those estimated. Their covariance is that of the innovation
+/// for each of the two moved towards the other, in which an error of the fix cancels; what they are off is found from
+/// the readings, since in the innovation it does so to first order only.
+template <class Gyros>
+void report_angles(const Layout& layout, const Gyros& gyros, const FixComparison& comparison, const Directions& h_b,
+                   FixReport& report) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    for (int j = k + 1; j < layout.gyros; ++j) {
+      const Eigen::Vector3d normal = gyros[k].h_in.cross(gyros[j].h_in);
+      const double sine = normal.norm();
+      if (!comparison.used[k] || !comparison.used[j] || !(sine > 0)) {
+        continue;
+      }
+      const double cosine_off = gyros[k].h_in.dot(gyros[j].h_in) - gyros[k].in_c(h_b[k]).dot(gyros[j].in_c(h_b[j]));
+      Eigen::Vector4d towards;
+      towards << comparison.gyros[k].by_phi * normal / sine, -(comparison.gyros[j].by_phi * normal) / sine;
+      Eigen::Matrix4d S;
+      S << report.innovation_covariance.template block<2, 2>(2L * k, 2L * k),
+          report.innovation_covariance.template block<2, 2>(2L * k, 2L * j),
+          report.innovation_covariance.template block<2, 2>(2L * j, 2L * k),
+          report.innovation_covariance.template block<2, 2>(2L * j, 2L * j);
+      report.angle_off_rad = std::max(report.angle_off_rad, std::abs(cosine_off) / sine);
+      report.angle_sigma_rad = std::max(report.angle_sigma_rad, std::sqrt(towards.dot(S * towards)));
+    }
+  }
+}
+
 }  // namespace detail
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, const White& white, double misfit_rad,
-                                             FixReport& report) {
+                                             const Directions& h_b, FixReport& report) {
+  constexpr double kPartOfMisfit = 0.2;  // less may be what the model leaves out
   report.nis = white.nis;
   const ComponentCovariance left = white.L.lazyProduct(white.covariance);
   detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
+  detail::report_angles(layout(), gyros_, comparison, h_b, report);
 
-  report.status = gate_.judge(setup_, report.nis, misfit_rad, comparison.components());
+  const bool is_of_gyros = report.gyros_contradict() && report.angle_off_rad > kPartOfMisfit * misfit_rad;
+  report.status = gate_.judge(setup_, report.nis, misfit_rad, comparison.components(), is_of_gyros);
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
@@ -676,7 +706,7 @@ void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& it
   const FixComparison comparison = compared(its, correction, readings);
   const double misfit_rad = detail::misfit_rad(comparison);
   const White white = whitened(comparison, its.R_c, correction.reading_noise_rad);
-  ask_gate(comparison, white, misfit_rad, report);
+  ask_gate(comparison, white, misfit_rad, readings.h_b, report);
   correction.stage = Stage::kUpdate;
   if (report.status != FixStatus::kUsed) {
     second_order_.hold_s = 0;  // the next fix is further from the last that was used

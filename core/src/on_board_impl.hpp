@@ -202,11 +202,11 @@ void OnBoard<Estimator>::set_clock(Time t, StepReport& report) {
   const Duration shift = t - this->t();
   if (is_working()) {
     finish(report);
-    report.fix.t += shift;
+    report.fix.t = shifted(report.fix.t, shift);
   }
   follow_all_samples();
-  corrected_t_ += shift;
-  worked_t_ += shift;
+  corrected_t_ = shifted(corrected_t_, shift);
+  worked_t_ = shifted(worked_t_, shift);
   schedule_.set_clock(shift);
   frozen_fixes_.set_clock(shift);
   follower_t_ = passed_t_ = t;

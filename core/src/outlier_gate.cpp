@@ -17,7 +17,8 @@ double gate_of_freedom(int freedom, double gate_nis) {
   return freedom * root * root * root;
 }
 
-FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double misfit_rad, int freedom) {
+FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double misfit_rad, int freedom,
+                             bool is_of_gyros) {
   const double largest_rad = kLargestStep_rad + kLargestRate_rad_s * since_fix_s_;
   const double before_rad = std::exchange(misfit_rad_, misfit_rad);
   const bool jumped_now = !(misfit_rad - before_rad <= largest_rad);
@@ -25,6 +26,7 @@ FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double m
   FixStatus status = FixStatus::kUsed;
   if (!(nis <= gate_of_freedom(freedom, setup.gate_nis))) {
     look_for_jump(jumped_now, before_rad, largest_rad, setup.reopen_after_rejections);
+    jumped_ = jumped_ && !is_of_gyros;
     if (++rejections_in_a_row_ < (jumped_ ? setup.reopen_after_jump_rejections : setup.reopen_after_rejections)) {
       return FixStatus::kRejectedByGate;
     }

@@ -46,7 +46,9 @@ static_assert(static_cast<std::uint32_t>(Fault::kNoAttitude) == TRIHEDRON_FAULT_
 static_assert(static_cast<std::uint32_t>(Fault::kClockSetBack) == TRIHEDRON_FAULT_CLOCK_SET_BACK);
 static_assert(static_cast<std::uint32_t>(Fault::kGap) == TRIHEDRON_FAULT_GAP);
 static_assert(static_cast<std::uint32_t>(Fault::kAccuracy) == TRIHEDRON_FAULT_ACCURACY);
-static_assert(kFaults == 6);
+static_assert(static_cast<std::uint32_t>(Fault::kGyrosContradict) == TRIHEDRON_FAULT_GYROS_CONTRADICT);
+static_assert(static_cast<std::uint32_t>(Fault::kFixesContradict) == TRIHEDRON_FAULT_FIXES_CONTRADICT);
+static_assert(kFaults == 8);
 static_assert(static_cast<std::uint32_t>(SampleStatus::kNone) == TRIHEDRON_SAMPLE_NONE);
 static_assert(static_cast<std::uint32_t>(SampleStatus::kUsed) == TRIHEDRON_SAMPLE_USED);
 static_assert(static_cast<std::uint32_t>(SampleStatus::kRejectedNotDirection) == TRIHEDRON_SAMPLE_REJECTED_NOT_DIRECTION);

@@ -66,7 +66,7 @@ TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
   }
   EXPECT_EQ(behind(2), Clock::kSetBack);
   // A time from which no difference can be told is none.
-  for (const Time t : {Time::min(), Time::max(), Time(Intake<>::kMaxTime + Duration(1))}) {
+  for (const Time t : {Time::min(), Time::max(), Time(kMaxTime + Duration(1))}) {
     EXPECT_EQ(intake.look_at_clock(t, std::nullopt), Clock::kOutOfOrder);
     EXPECT_EQ(intake.look_at_clock(t, second(1000)), Clock::kOutOfOrder);
   }
@@ -75,6 +75,17 @@ TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
     EXPECT_EQ(behind(10.0 + i), Clock::kOutOfOrder);
     EXPECT_EQ(behind(90.0 - i), Clock::kOutOfOrder);
   }
+}
+
+/// However the clock is set, times stay such as differences can be told of.
+TEST(Shifted, StaysWithinTheTimesThatAreAccepted) {
+  EXPECT_EQ(shifted(second(5), std::chrono::seconds(-8)), second(-3));
+  for (const Duration shift : {2 * kMaxTime, kMaxTime, -kMaxTime, -2 * kMaxTime}) {
+    const Time end(shift > Duration::zero() ? kMaxTime : -kMaxTime);
+    EXPECT_EQ(shifted(end, shift), end);
+    EXPECT_EQ(shifted(second(0), shift), end);
+  }
+  EXPECT_EQ(shifted(Time(kMaxTime), -2 * kMaxTime), Time(-kMaxTime));
 }
 
 TEST(Intake, MakesReadingsUnitAndRejectsWhatIsNoDirection) {

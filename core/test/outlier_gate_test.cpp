@@ -19,8 +19,8 @@ class Gate : public OutlierGate {
     setup_.reopen_after_jump_rejections = reopen_after_jump;
     setup_.restart_within_fixes = 10;
   }
-  FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents) {
-    return OutlierGate::judge(setup_, nis, misfit_rad, freedom);
+  FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents, bool is_of_gyros = false) {
+    return OutlierGate::judge(setup_, nis, misfit_rad, freedom, is_of_gyros);
   }
 
  private:
@@ -44,6 +44,19 @@ TEST(GateOfFreedom, IsPassedAsOftenByGoodMeasurements) {
   EXPECT_NEAR(gate_of_freedom(2, 30), 24.5, 0.6);
   EXPECT_NEAR(gate_of_freedom(3, 30), 27.4, 0.3);
   EXPECT_NEAR(gate_of_freedom(6, 30), 34.6, 0.5);
+}
+
+TEST(OutlierGate, DoesNotPutAJumpDownToTheStarTrackerWhereTheGyrosContradict) {
+  for (const bool is_of_gyros : {false, true}) {
+    Gate gate(5, 50);
+    EXPECT_EQ(gate.judge(3, kSmall_rad), FixStatus::kUsed);
+    int rejected = 0;
+    while (gate.judge(100, kLie_rad, kPairComponents, is_of_gyros) == FixStatus::kRejectedByGate) {
+      EXPECT_EQ(gate.jumped(), !is_of_gyros);
+      ++rejected;
+    }
+    EXPECT_EQ(rejected, is_of_gyros ? 4 : 49);
+  }
 }
 
 TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {

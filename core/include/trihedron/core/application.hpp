@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "trihedron/core/forecast.hpp"
@@ -35,7 +36,7 @@ class Application {
  public:
   using Gyros = typename Estimator::Gyros;
   /// For SnapshotStore. To be counted up whenever a member of the state is added, removed or gets another meaning.
-  static constexpr std::uint32_t kStateVersion = 11;
+  static constexpr std::uint32_t kStateVersion = 12;
   static constexpr std::uint32_t kSnapshotLayout =
       kStateVersion << 16 | static_cast<std::uint32_t>(Estimator::kMaxStates) << 4 | sizeof(void*);
 
@@ -84,7 +85,11 @@ class Application {
   void set(Fault fault, bool is_there);
 
   void note(const StepReport& report);
+  void note_contradiction(const FixReport& report);
   void note_sample(const StepReport& report);
+  void note_time_of_refused(const StepReport& report);
+  void note_angles(const StepReport& report, const Directions& h_b);
+  [[nodiscard]] double largest_angle_off_rad(const StepReport& report, const Directions& h_b) const;
   void note_fix(const StepReport& report);
   void note_used_fix(const StepReport& report);
   void restart();
@@ -109,16 +114,21 @@ class Application {
   Time now_{};         ///< of the latest sample whose time was accepted
   Time used_t_{};      ///< of the latest sample used
   Time fix_t_{};       ///< of the latest fix used; before the first, of the start
-  Time attitude_t_{};  ///< of the latest sample that gave an attitude, or could have
+  Time attitude_t_{};  ///< of the latest sample that gave an attitude, or could have; later by gaps since then
   Time unknown_until_ = Time::min();  ///< end of the last gap or jump of the clock
   std::uint32_t faults_ = 0;
+  double angle_sigma_rad_ = std::numeric_limits<double>::infinity();  ///< of the last fix that was compared
+  double angle_off_rad_ = 0;                                          ///< the largest since gyros contradict each other
+  double fixes_off_rad_ = 0;  ///< what fixes that were followed against an adopted calibration were off
+  int fixes_to_agree_ = 0;    ///< from now on, until they are believed
+  int angle_run_ = 0;         ///< samples in a row whose angle says otherwise than the fault
   int fixes_since_start_ = 0;
   int refused_in_a_row_ = 0;
   Mode mode_ = Mode::kStandby;
   Adoption adoption_ = Adoption::kNone;
   bool loaded_ = false;
   bool held_ = false;
-  bool has_sample_ = false;
+  bool has_sample_ = false;  ///< or one that was refused, whose time was accepted
 };
 
 /// The flight computer's: two gyros with eq. (1), one star tracker.

@@ -21,7 +21,11 @@ struct FixReport {
   int head = 0;           ///< the star tracker
   Innovation innovation;  ///< −z of eq. (3); empty where the fix was not compared
   Covariance innovation_covariance;
-  double nis = 0;               ///< innovation² over its covariance; as many degrees of freedom as components
+  double nis = 0;  ///< innovation² over its covariance; as many degrees of freedom as components
+  /// What the angles between the momenta that were read are off those estimated, and the 1-sigma of that, rad; each the
+  /// largest of all pairs of gyros used. An error of the fix has no part in it. Zero where the fix was not compared.
+  double angle_off_rad = 0;
+  double angle_sigma_rad = 0;
   double weight = 1;            ///< the noise was assumed 1/√weight times the nominal one; 1 without Student's t
   int rejections_in_a_row = 0;  ///< or, with Student's t, fixes above the gate
   /// The misfit appeared within one fix and is larger than drift can cause: attributed to the star tracker.
@@ -29,7 +33,12 @@ struct FixReport {
   /// Index of the one gyro without which all others agree with the fix, where a fault of it explains the rejection.
   int odd_gyro = kNoGyro;
 
+  /// An angle that is off by more sigmas is not by chance: a gyro is at fault, or its momentum or alignment is not what
+  /// the estimator takes it for.
+  static constexpr double kContradiction = 8;
+
   [[nodiscard]] bool used() const { return is_used(status); }
+  [[nodiscard]] bool gyros_contradict() const { return angle_off_rad > kContradiction * angle_sigma_rad; }
 };
 
 /// The report on a fix at which the estimate was lost.

@@ -59,7 +59,7 @@ class FrozenFixes {
   /// The clock has been set back by −shift.
   void set_clock(Duration shift) {
     for (Last& last : last_) {
-      last.t += shift;
+      last.t = shifted(last.t, shift);
     }
   }
 

@@ -21,8 +21,6 @@ class Intake {
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Consecutive samples behind the present time after which the clock is taken to have been set back.
   static constexpr int kSetBackSamples = 16;
-  /// Times farther from the origin, 146 years, are out of order, so that the difference of any two can be told.
-  static constexpr Duration kMaxTime = Duration::max() / 2;
 
   Intake() = default;
   explicit Intake(const CalibrationSetup& setup);

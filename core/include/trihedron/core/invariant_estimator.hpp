@@ -251,7 +251,8 @@ class InvariantEstimator {
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
   void put_innovation(White& white) const;
   /// Reports the innovation and what the gate says of it.
-  void ask_gate(const FixComparison& comparison, const White& white, double misfit_rad, FixReport& report);
+  void ask_gate(const FixComparison& comparison, const White& white, double misfit_rad, const Directions& h_b,
+                FixReport& report);
   /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
   /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.

@@ -15,7 +15,8 @@ inline constexpr int kPairComponents = 4;
 /// Rejects fixes whose NIS is above a gate, without locking out good ones: after a run of rejections the model is taken
 /// to be wrong, not the tracker, and the directions are reopened (their covariance is widened); when that happens again
 /// soon, the filter restarts. Where the misfit has jumped by more than a momentum can drift, the star tracker is taken
-/// to be wrong, and the run may be much longer.
+/// to be wrong, and the run may be much longer; but not where the angle between the momenta, to which no star tracker
+/// adds anything, has a part in the misfit.
 class OutlierGate {
  public:
   /// Largest change of the misfit from one fix to the next that a wrong model can cause: at once, by an alignment wrong
@@ -28,9 +29,9 @@ class OutlierGate {
   void elapse(double dt_s) { since_fix_s_ += dt_s; }
 
   /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
-  /// the innovation; `freedom`: its components.
+  /// the innovation; `freedom`: its components; `is_of_gyros`: whether the gyros contradict each other.
   [[nodiscard]] FixStatus judge(const CalibrationSetup& setup, double nis, double misfit_rad,
-                                int freedom = kPairComponents);
+                                int freedom = kPairComponents, bool is_of_gyros = false);
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
   /// Whether the present run of rejections is put down to the tracker.
   [[nodiscard]] bool jumped() const { return jumped_; }

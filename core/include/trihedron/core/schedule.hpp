@@ -56,7 +56,7 @@ class Schedule {
   void no_angles() { angles_t_ = Time::max(); }
   /// The clock has been set back by −shift.
   void set_clock(Duration shift) {
-    angles_t_ = angles_t_ == Time::max() ? angles_t_ : angles_t_ + shift;
+    angles_t_ = angles_t_ == Time::max() ? angles_t_ : shifted(angles_t_, shift);
     taken_until_ = Time::min();
   }
 

@@ -92,8 +92,15 @@ enum class Fault : std::uint32_t {
   kGap = 16,
   /// The star tracker has been lost for longer than the calibration keeps the required error.
   kAccuracy = 32,
+  /// The angle between two momenta is off by more than 8 sigmas: a gyro is at fault, which of two is not known. The
+  /// sigmas of the attitude have ten times the angle in them.
+  kGyrosContradict = 64,
+  /// Fixes contradicted the calibration adopted and were followed in the end: star tracker or gyros, which is not
+  /// known. Until `reopen_after_jump_rejections` fixes were used since, the sigmas of the attitude have what the
+  /// fixes were off in them, and no calibration is adopted but by command.
+  kFixesContradict = 128,
 };
-inline constexpr std::size_t kFaults = 6;
+inline constexpr std::size_t kFaults = 8;
 
 /// What a slot for snapshots holds.
 enum class SnapshotAnswer : std::uint8_t {

@@ -18,6 +18,18 @@ struct Tai {
 using Time = Tai::time_point;
 using Duration = Tai::duration;
 
+/// Times farther from the origin, 146 years, are not accepted, so that the difference of any two can be told.
+inline constexpr Duration kMaxTime = Duration::max() / 2;
+
+/// A time within that, when the clock is set by `shift`; the end that it would pass.
+[[nodiscard]] constexpr Time shifted(Time t, Duration shift) {
+  const Duration since = t.time_since_epoch();
+  if (shift > Duration::zero()) {
+    return since > kMaxTime - shift ? Time(kMaxTime) : t + shift;
+  }
+  return since < -kMaxTime - shift ? Time(-kMaxTime) : t + shift;
+}
+
 /// Correctly rounded: 3 s is 3.0 and not its neighbour, so that files show what was meant.
 [[nodiscard]] constexpr double to_seconds(Duration d) { return static_cast<double>(d.count()) / 1e9; }
 

@@ -22,7 +22,9 @@ inline constexpr std::array<FaultRow, kFaults> kFaultRows = {{{Fault::kStarTrack
                                                               {Fault::kNoAttitude, "no attitude"},
                                                               {Fault::kClockSetBack, "clock set back"},
                                                               {Fault::kGap, "gap"},
-                                                              {Fault::kAccuracy, "accuracy lost"}}};
+                                                              {Fault::kAccuracy, "accuracy lost"},
+                                                              {Fault::kGyrosContradict, "gyros contradict"},
+                                                              {Fault::kFixesContradict, "fixes contradict"}}};
 
 /// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(Mode mode) { return kModeNames[static_cast<std::size_t>(mode)]; }
