@@ -310,6 +310,27 @@ void screen_one_gyro(const Series& series, const Kept& kept, std::size_t gyro, s
   silent.report(defects);
 }
 
+/// No two rotors have the same noise: readings that are alike sample after sample are of one gyro.
+void refuse_a_copy(const Series& series, const Kept& kept, std::size_t one, std::size_t other) {
+  constexpr double kMost = 0.9;
+  std::size_t both = 0;
+  std::size_t equal = 0;
+  for (const std::size_t row : kept.rows) {
+    const double* const a = series.row(row) + one * 3;
+    const double* const b = series.row(row) + other * 3;
+    if (judge_norm<3>(a) == Norm::kGood && judge_norm<3>(b) == Norm::kGood) {
+      ++both;
+      equal += std::equal(a, a + 3, b) ? 1U : 0U;
+    }
+  }
+  if (both > 0 && static_cast<double>(equal) > kMost * static_cast<double>(both)) {
+    throw InputRefused(
+        series.file, {},
+        fmt::format("gyro {} has the readings of gyro {}, {} of {} to the last digit", other + 1, one + 1, equal, both),
+        fmt::format("give those of gyro {}, or leave it out", other + 1));
+  }
+}
+
 /// Of a row of a star tracker, whose quaternion comes first; not told where it is no covariance, or an impossible one.
 FixCovariance covariance_of(const double* row, std::size_t columns) {
   constexpr std::size_t kQuaternion = 4;
@@ -374,6 +395,9 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, const std
   const std::size_t gyros = series.columns.size() / 3;
   for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
     screen_one_gyro(series, kept, gyro, defects);
+    for (std::size_t before = 0; before < gyro; ++before) {
+      refuse_a_copy(series, kept, before, gyro);
+    }
   }
   compact(series, kept);
   return {static_cast<int>(gyros), std::move(kept.t), std::move(series.values)};

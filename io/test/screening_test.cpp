@@ -1,5 +1,6 @@
 #include "screening.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
@@ -289,6 +290,23 @@ TEST_P(Screening, RefusesAGyroThatIsSilentAllPassLong) {
     }
     EXPECT_THAT(load_refused(), HasSubstr(gyro_table() + ", gyro 2 is silent all pass long"));
   }
+}
+
+/// As of a mapping that names the columns of one gyro twice.
+TEST_P(Screening, RefusesAGyroThatIsACopyOfAnother) {
+  for (auto& row : raw_.gyro.rows) {
+    std::copy_n(row.begin() + 1, 3, row.begin() + 4);
+  }
+  const auto rows = raw_.gyro.rows.size();
+  EXPECT_THAT(load_refused(),
+              HasSubstr(fmt::format("gyro 2 has the readings of gyro 1, {} of {} to the last digit", rows, rows)));
+  raw_.gyro.rows[0][4] = kNaN;
+  EXPECT_THAT(load_refused(), HasSubstr(fmt::format("{} of {} to the last digit", rows - 1, rows - 1)));
+  const RawPass clean = clean_pass();
+  for (std::size_t i = 0; i < rows / 4; ++i) {
+    raw_.gyro.rows[i] = clean.gyro.rows[i];
+  }
+  EXPECT_EQ(load_refused(), "");
 }
 
 TEST_P(Screening, RefusesTelemetryShorterThanAMinute) {

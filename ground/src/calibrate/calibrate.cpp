@@ -489,6 +489,20 @@ std::optional<WithoutErrorsBesideOutages> without_errors_beside_outages(const Pa
   return WithoutErrorsBesideOutages{std::move(used), *errors};
 }
 
+/// What a pass says without the earlier calibration that it was given as prior; nothing where that is not to be
+/// trusted.
+std::optional<Calibration> by_pass_alone(Pass pass, const CalibrationOptions& options, const Progress& progress) {
+  begin_stage(progress, "calibrates without the prior, to compare");
+  pass.settings.prior.reset();
+  try {
+    CalibrationRun run = calibrate_as_stamped(pass, options, {});
+    run.calibration.determined = determined(run);
+    return judge(pass, run).trustworthy ? std::optional(std::move(run.calibration)) : std::nullopt;
+  } catch (const SetupError&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
@@ -534,6 +548,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   }
   const Pass& stamped = without_errors ? without_errors->pass : of_independent;
   CalibrationRun run = calibrate_as_stamped(stamped, asked, progress);
+  if (stamped.settings.prior && !known_before) {
+    run.by_pass_alone = by_pass_alone(stamped, asked, progress);
+  }
   if (without_errors) {
     run.beside_outages = without_errors->errors;
   }

@@ -36,8 +36,8 @@ std::string Agreement::text() const {
                            chi_square, degrees_of_freedom, limit);
 }
 
-Agreement agreement(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance) {
-  return agreement_of(difference.dot(covariance.llt().solve(difference)), static_cast<int>(difference.size()));
+Agreement agreement(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance, double sure) {
+  return agreement_of(difference.dot(covariance.llt().solve(difference)), static_cast<int>(difference.size()), sure);
 }
 
 Agreement agreement_within(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <map>
 
 #include "judge/findings.hpp"
 #include "judge/shape_of_errors.hpp"
@@ -217,6 +218,59 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
         fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ in pass.toml", now.x(), now.y(), now.z(),
                     given.x(), given.y(), given.z()),
         "Correct the noise figures of the star tracker in pass.toml.");
+  }
+}
+
+// A few fixes whose covariances are far too small have nearly all of the weight, and do not show in a mean over all
+// fixes. Those told to be the most accurate are looked at by themselves; outliers are fewer than half of any group.
+void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std::vector<Finding>& findings) {
+  constexpr std::ptrdiff_t kFewest = 8;
+  constexpr double kMoreAccurate = 0.5;  // than the fix in the middle
+  constexpr double kUnusual = 0.01;
+  constexpr double kLittleWeight = 0.01;  // of that of all fixes
+  std::map<int, std::vector<const FixRecord*>> by_head;
+  for (const FixRecord& fix : fixes) {
+    const bool is_judged = fix.status == FixStatus::kUsed || fix.status == FixStatus::kRejectedByGate;
+    if (is_judged && fix.told_sigma_rad > 0 && fix.degrees_of_freedom > 0) {
+      by_head[fix.head].push_back(&fix);
+    }
+  }
+  const auto is_off = [&](const FixRecord& fix) {
+    const boost::math::chi_squared its(fix.degrees_of_freedom);
+    return !(fix.nis <= boost::math::quantile(boost::math::complement(its, kUnusual)));
+  };
+  for (auto& [head, its] : by_head) {
+    std::ranges::stable_sort(its, {}, &FixRecord::told_sigma_rad);
+    const double middle_rad = its[its.size() / 2]->told_sigma_rad;
+    const auto others = std::ranges::upper_bound(its, kMoreAccurate * middle_rad, {}, &FixRecord::told_sigma_rad);
+    const auto accurate = others - its.begin();
+    std::ptrdiff_t off = 0;
+    std::ptrdiff_t group = 0;  // the largest of which more than half are off
+    std::ptrdiff_t off_in_group = 0;
+    double weight = 0;  // of those used, in that of a fix in the middle
+    for (std::ptrdiff_t i = 0; i < accurate; ++i) {
+      const FixRecord& fix = *its[static_cast<std::size_t>(i)];
+      off += is_off(fix) ? 1 : 0;
+      weight += fix.used() ? std::pow(middle_rad / fix.told_sigma_rad, 2) : 0;
+      const bool matters = weight > kLittleWeight * static_cast<double>(its.size());
+      if (i + 1 >= kFewest && 2 * off > i + 1 && matters) {
+        group = i + 1;
+        off_in_group = off;
+      }
+    }
+    if (group == 0) {
+      continue;
+    }
+    const FixRecord& last = *its[static_cast<std::size_t>(group) - 1];
+    const FixRecord& first = **std::ranges::min_element(its.begin(), its.begin() + group, {}, &FixRecord::t);
+    add(findings, FindingCode::kFixCovariancesTooSmall,
+        "Fixes that are told to be much more accurate than the others are not: they have most of the weight, and their "
+        "errors are in the result.",
+        fmt::format("star tracker {}: of {} fixes told {:.2g}″ and less, where half are told {:.2g}″ and more, {} are "
+                    "off by more than one in a hundred is by chance; the first at t_s {:.3f}",
+                    head + 1, group, last.told_sigma_rad / kArcsecond, middle_rad / kArcsecond, off_in_group,
+                    to_seconds(first.t - epoch)),
+        "Correct the covariances of these fixes (cov_*), or leave out the covariances or the fixes.");
   }
 }
 

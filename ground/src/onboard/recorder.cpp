@@ -1,5 +1,6 @@
 #include "trihedron/ground/onboard/recorder.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -64,6 +65,11 @@ FixRecord record_of(const StepReport& report, int gyros) {
   record.nis = report.fix.nis;
   record.degrees_of_freedom =
       2 * static_cast<int>(std::count(report.gyros.begin(), report.gyros.begin() + gyros, GyroState::kUsed));
+  if (report.compared && report.compared->fix.covariance.is_told()) {
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_covariance;
+    of_covariance.computeDirect(report.compared->fix.covariance.matrix(), Eigen::EigenvaluesOnly);
+    record.told_sigma_rad = std::sqrt(std::max(of_covariance.eigenvalues()(0), 0.0));
+  }
   record.jumped = report.fix.jumped;
   record.corrected_navigator = report.corrected;
   return record;

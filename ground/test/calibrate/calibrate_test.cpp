@@ -21,6 +21,7 @@
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/units.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::ground {
@@ -581,6 +582,30 @@ TEST(Calibrate, TakesDriftModelsOfAnyDegreeOnBoard) {
   const auto run = navigate(pass, {});
   const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
   EXPECT_LT(statistics(errors).max_total_rad, 5e-4);
+}
+
+/// Known to a second of arc, and then one of them has moved by half a minute: fixes in slews are rejected, and what is
+/// estimated stays where it was.
+TEST(Calibrate, DoesNotTrustAnEarlierCalibrationOfACaseThatHasMoved) {
+  const sim::SimulatedPass first = sim::simulate(scenario_in_eq1(11, std::chrono::hours(4)));
+  const Calibration before = calibrate(first.pass, told()).calibration;
+  Pass next =
+      sim::simulate(with_gyros_of(first.truth, scenario_in_eq1(12, std::chrono::hours(2)), std::chrono::hours(24)))
+          .pass;
+  EXPECT_FALSE(calibrate(next, told()).by_pass_alone);
+  next.settings.prior = before;
+  const CalibrationRun same = calibrate(next, told());
+  EXPECT_TRUE(same.by_pass_alone);
+  EXPECT_FALSE(same.calibration.verdict.has(FindingCode::kPriorContradicted));
+  const Eigen::Matrix3d moved = Rot<C, C>::exp(Vec<C>::assume(0, 30 * kArcsecond, 0)).raw();
+  for (std::size_t i = 0; i < next.gyro.t.size(); ++i) {
+    Eigen::Map<Eigen::Vector3d> reading(next.gyro.h.data() + 6 * i);
+    reading = moved * reading.eval();
+  }
+  const Verdict verdict = calibrate(next, told()).calibration.verdict;
+  const auto found = std::ranges::find(verdict.findings, FindingCode::kPriorContradicted, &Finding::code);
+  ASSERT_NE(found, verdict.findings.end());
+  EXPECT_THAT(found->evidence, HasSubstr("of 20 degrees of freedom"));  // by the pass alone
 }
 
 TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {

@@ -88,6 +88,54 @@ TEST(Verdict, OfAGoodRunIsTrustworthyWithoutFindings) {
   EXPECT_THAT(codes(verdict), IsEmpty());
 }
 
+/// A result that stayed at an earlier calibration, which was sure of itself, since the fixes that contradict it were
+/// rejected.
+TEST(Verdict, ComparesAnEarlierCalibrationWithThePassAlone) {
+  Pass pass = good_pass();
+  pass.settings.prior.emplace();
+  CalibrationRun run = good_run();
+  run.known_before.states = run.calibration.states;
+  run.known_before.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
+  EXPECT_THAT(codes(judge(pass, run)), testing::Not(testing::Contains("prior-contradicted")));
+  run.by_pass_alone = run.calibration;
+  EXPECT_THAT(codes(judge(pass, run)), testing::Not(testing::Contains("prior-contradicted")));
+  run.by_pass_alone->gyros[0].alignment_rotation_vector_rad.x() = 1e-5;  // seven sigmas of the difference
+  const Verdict verdict = judge(pass, run);
+  EXPECT_THAT(codes(verdict), testing::Contains("prior-contradicted"));
+  EXPECT_FALSE(verdict.trustworthy);
+}
+
+/// Some that are told to be a hundred times as accurate as the others, and are not. In a mean over all they do not
+/// show.
+TEST(Verdict, ForbidsFixesWhoseCovariancesAreFarTooSmall) {
+  const auto judged = [](std::size_t many, double told_rad, double nis, std::size_t used) {
+    CalibrationRun run = good_run();
+    for (std::size_t i = 0; i < run.fixes.size(); ++i) {
+      FixRecord& fix = run.fixes[i];
+      fix.told_sigma_rad = 1.5e-5;
+      fix.nis = 3.4;
+      fix.degrees_of_freedom = 4;
+      if (i >= 100 && i < 100 + many) {
+        fix.told_sigma_rad = told_rad;
+        fix.nis = nis;
+        fix.status = i < 100 + used ? FixStatus::kUsed : FixStatus::kRejectedByGate;
+      }
+    }
+    return judge(good_pass(), run);
+  };
+  const Verdict verdict = judged(30, 1.5e-7, 100, 3);
+  EXPECT_THAT(codes(verdict), ElementsAre("fix-covariances-too-small"));
+  EXPECT_FALSE(verdict.trustworthy);
+  EXPECT_THAT(verdict.findings.front().evidence, testing::HasSubstr("of 30 fixes told 0.031″ and less"));
+  EXPECT_THAT(verdict.findings.front().evidence, testing::HasSubstr("30 are off by more than one in a hundred is by "
+                                                                    "chance; the first at t_s 300.000"));
+  EXPECT_THAT(codes(judged(30, 1.5e-7, 100, 0)), IsEmpty());   // rejected, all of them
+  EXPECT_THAT(codes(judged(30, 1.5e-7, 3.4, 30)), IsEmpty());  // and they are as accurate
+  EXPECT_THAT(codes(judged(30, 1e-5, 100, 3)), IsEmpty());     // told about as accurate as the others
+  EXPECT_THAT(codes(judged(30, 7e-6, 100, 3)), IsEmpty());     // and these have little weight
+  EXPECT_THAT(codes(judged(7, 1.5e-7, 100, 3)), IsEmpty());    // too few to tell
+}
+
 TEST(Verdict, FindsABatchThatHasNotConverged) {
   auto run = good_run();
   run.calibration.statistics.batch_iterations = 12;

@@ -29,6 +29,7 @@ struct FixRecord {
   std::vector<double> innovation_sigma;  ///< rad
   double nis = 0;
   int degrees_of_freedom = 0;  ///< of the NIS: two per gyro that could be used
+  double told_sigma_rad = 0;   ///< the smallest by the covariance that it came with; 0 without one
   bool jumped = false;         ///< its misfit came at once and is more than drift can make
   bool corrected_navigator = false;
   /// Rotation vector from the attitude of the open-loop navigator to that of the fix, c axes, rad; where both are
@@ -208,6 +209,9 @@ struct CalibrationRun {
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   std::optional<AgainstField> against_field;     ///< where eq. (1) alone was asked for
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
+  /// By the pass alone, without the earlier calibration that it was given as prior; where it had one, and is to be
+  /// trusted without it.
+  std::optional<Calibration> by_pass_alone;
   Calibration calibration;                       ///< with verdict and statistics
   /// Of its states, taken for constant: without what coefficients that may have changed add.
   Eigen::MatrixXd covariance_of_constants;

@@ -20,8 +20,10 @@ struct Agreement {
   [[nodiscard]] std::string text() const;
 };
 
-/// In all directions. `covariance`: of the difference, positive definite.
-[[nodiscard]] Agreement agreement(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance);
+/// In all directions. `covariance`: of the difference, positive definite. `sure`: the part of agreeing ones that lie
+/// below the limit.
+[[nodiscard]] Agreement agreement(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,
+                                  double sure = 0.999);
 
 /// Only in the directions in which the difference is better known than by `scale`, a covariance, positive definite.
 [[nodiscard]] Agreement agreement_within(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,
