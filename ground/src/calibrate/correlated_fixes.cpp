@@ -118,7 +118,8 @@ class ErrorsAtRest {
     const FixByGyros& first = fixes_[five.front()];
     std::array<ByAlignments, 5> rows;
     std::ranges::transform(five, rows.begin(), [&](std::size_t i) {
-      const Eigen::Matrix3d turn = fixes_[i].C_in_c.transpose() * first.C_in_c;
+      // By the readings: with the errors of the fixes in it, alignments would turn these about.
+      const Eigen::Matrix3d turn = fixes_[i].C_c_g * first.C_c_g.transpose();
       return ByAlignments(fixes_[i].by_alignments - turn * first.by_alignments);
     });
     return rows;

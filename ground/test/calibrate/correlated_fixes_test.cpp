@@ -86,6 +86,22 @@ TEST(CorrelatedFixes, AreLeftOutForNavigationToo) {
   EXPECT_TRUE(run.verdict.has(FindingCode::kCorrelatedFixes));
 }
 
+/// As of a star tracker that is mounted at an angle: about no axis of c alone.
+TEST(CorrelatedFixes, AreNotThoseWithWhiteNoiseAboutATiltedAxis) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Scenario scenario = scenario_in_eq1(seed, std::chrono::hours(3));
+    scenario.star_tracker.noise_rad.setConstant(3 * kArcsecond);
+    Pass pass = sim::simulate(scenario).pass;
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const Eigen::Vector3d tilted_rad = 20 * kArcsecond * Eigen::Vector3d(std::sqrt(0.75), 0, 0.5);
+    for (Eigen::Quaterniond& q_in_c : pass.star_tracker.q_in_c) {
+      q_in_c = q_in_c * Rot<C, C>::exp(Vec<C>::assume(Eigen::Vector3d(normal(random) * tilted_rad))).quaternion();
+    }
+    EXPECT_THAT(correlated_fixes(pass), testing::IsEmpty()) << seed;
+  }
+}
+
 TEST(CorrelatedFixes, AreNotThoseWithWhiteNoise) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const sim::SimulatedPass simulated =
