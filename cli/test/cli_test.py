@@ -617,12 +617,12 @@ def test_a_silent_gyro_is_refused(csv_pass, tmp_path):
 def test_parallel_momenta_are_refused(csv_pass, tmp_path):
     directory = csv_pass(2)
 
-    def copy(lines):
+    def against_each_other(lines):
         for i in range(1, len(lines)):
             fields = lines[i].rstrip("\n").split(",")
-            lines[i] = ",".join(fields[:4] + fields[1:4]) + "\n"
+            lines[i] = ",".join(fields[:4] + [f"{-float(h):.9f}" for h in fields[1:4]]) + "\n"
 
-    edit_lines(directory / "gyro.csv", copy)
+    edit_lines(directory / "gyro.csv", against_each_other)
     refused(run("calibrate", directory, "-o", tmp_path / "out"), INPUT_REFUSED, "parallel")
     assert not (tmp_path / "out" / "calibration.json").exists()
 

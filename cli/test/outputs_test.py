@@ -56,10 +56,10 @@ def given(tmp_path_factory):
         (directory / f"{name}.toml").write_text(SCENARIO.format(seed))
         done("simulate", directory / f"{name}.toml", "-o", directory / name)
         done("simulate", directory / f"{name}.toml", "-o", directory / f"{name}.nc")
-    shutil.copytree(directory / "first", directory / "parallel")  # both momenta the same: refused once the work has begun
+    shutil.copytree(directory / "first", directory / "parallel")  # both momenta on one line: refused once the work has begun
     lines = [line.split(",") for line in (directory / "first" / "gyro.csv").read_text().splitlines()]
     (directory / "parallel" / "gyro.csv").write_text("\n".join(
-        ",".join(line if i == 0 else line[:4] + line[1:4]) for i, line in enumerate(lines)) + "\n")
+        ",".join(line if i == 0 else line[:4] + [f"{-float(h):.9f}" for h in line[1:4]]) for i, line in enumerate(lines)) + "\n")
     return directory
 
 

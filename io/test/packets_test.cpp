@@ -118,8 +118,9 @@ TEST(Packets, BringBackEveryNumberAndTime) {
   pass.gyro.h.clear();
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
     pass.gyro.t[i] += Duration(static_cast<std::int64_t>(i * 7919));  // whole nanoseconds, nothing rounder
-    for (const int gyro : {0, 1, 0}) {
-      const Eigen::Vector3d h = plain.gyro.direction(i, gyro) / 3.0;
+    const Eigen::Vector3d first = plain.gyro.direction(i, 0);
+    for (const Eigen::Vector3d& direction : {first, plain.gyro.direction(i, 1), Eigen::Vector3d(-first)}) {
+      const Eigen::Vector3d h = direction / 3.0;
       pass.gyro.h.insert(pass.gyro.h.end(), {3 * h.x(), 3 * h.y(), 3 * h.z()});
     }
   }

@@ -185,9 +185,9 @@ def test_datasets_are_refused_where_they_are_no_pass(flown):
 
 
 def test_a_pass_that_cannot_work_is_a_setup_error(arrays):
-    alike = arrays["directions"].copy()
-    alike[:, 1] = alike[:, 0]  # momenta along one line give no attitude
-    error = refusal(trihedron.calibrate, Pass.from_arrays(**{**arrays, "directions": alike}), kind=SetupError)
+    on_one_line = arrays["directions"].copy()
+    on_one_line[:, 1] = -on_one_line[:, 0]  # such momenta give no attitude
+    error = refusal(trihedron.calibrate, Pass.from_arrays(**{**arrays, "directions": on_one_line}), kind=SetupError)
     assert "no fix could be used" in error.reason
 
 
