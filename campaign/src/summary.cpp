@@ -260,8 +260,7 @@ void find_influences(const CampaignPlan& plan, const Records& records, CampaignS
       drawn.push_back(plan.inputs[i].shown(record->draws[i]));
     }
     for (std::size_t k = 0; k < kMeasures.size(); ++k) {
-      if (const auto correlation =
-              rank_correlation(drawn, plan.inputs[i].is_setting() ? of_runs[k] : of_flights[k])) {
+      if (const auto correlation = rank_correlation(drawn, plan.inputs[i].is_setting() ? of_runs[k] : of_flights[k])) {
         ++summary.pairs;
         summary.influences.push_back({i, &kMeasures.at(k), *correlation, false});
       }

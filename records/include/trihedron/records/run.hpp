@@ -212,7 +212,7 @@ struct CalibrationRun {
   /// By the pass alone, without the earlier calibration that it was given as prior; where it had one, and is to be
   /// trusted without it.
   std::optional<Calibration> by_pass_alone;
-  Calibration calibration;                       ///< with verdict and statistics
+  Calibration calibration;  ///< with verdict and statistics
   /// Of its states, taken for constant: without what coefficients that may have changed add.
   Eigen::MatrixXd covariance_of_constants;
   OpenLoopStart errors;  ///< of the calibration
