@@ -1,9 +1,10 @@
 #ifndef TRIHEDRON_H
 #define TRIHEDRON_H
 /**
- * The on-board application in C99. It allocates nothing, has no global state, and calls nothing of the system: the
- * caller owns the memory, feeds samples and fixes in time order, and asks. One object is used by one thread at a time.
- * No pointer may be null unless it says so. docs/flight-interface.md describes records and numbers.
+ * The on-board application in C99. It allocates nothing, has no global state, and calls nothing of the system: the caller
+ * owns the memory, feeds samples and fixes in time order, and asks. One object is used by one thread at a time. No pointer
+ * may be null unless it says so.
+ * docs/flight-interface.md describes records and numbers.
  */
 
 #include <stddef.h>
@@ -46,8 +47,8 @@ size_t trihedron_snapshots_size(uint32_t gyros);
 typedef struct trihedron_application trihedron_application;
 
 /**
- * Makes an object with room for `gyros` gyros in standby, without parameters. Null where the memory is null, too small
- * or not aligned, or `gyros` is neither 2 nor 3. Nothing is to be done to end its life.
+ * Makes an object with room for `gyros` gyros in standby, without parameters. Null where the memory is null, too small or
+ * not aligned, or `gyros` is neither 2 nor 3. Nothing is to be done to end its life.
  */
 trihedron_application* trihedron_create(void* memory, size_t size, uint32_t gyros);
 
@@ -64,10 +65,9 @@ uint32_t trihedron_command(trihedron_application* its, uint32_t command, uint32_
 uint32_t trihedron_on_gyro(trihedron_application* its, const trihedron_gyro_sample* sample);
 
 /**
- * One fix: of `trihedron_fix`, of this fix, or of one before it where they come so fast that it is dealt with now. It
- * waits for the samples round it; `last_fix` of the housekeeping record then says what was done with it. A fix whose
- * time is more than 1.4 s before that of the latest sample comes too late, since its samples have been passed:
- * rejected_out_of_order.
+ * One fix: of `trihedron_fix`, of this fix, or of one before it where they come so fast that it is dealt with now. It waits
+ * for the samples round it; `last_fix` of the housekeeping record then says what was done with it. A fix whose time is more than
+ * 1.4 s before that of the latest sample comes too late, since its samples have been passed: rejected_out_of_order.
  */
 uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* fix);
 
@@ -75,9 +75,8 @@ uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* 
 uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron_attitude* attitude);
 
 /**
- * What the filter has found. 1; or 0 before the first fix, and between the two calls in which a fix is taken in, and
- * nothing is written: to be asked again after the next sample. Some ten thousand operations, and 6 KB of stack for two
- * gyros, 13 KB for three.
+ * What the filter has found. 1; or 0 before the first fix, and between the two calls in which a fix is taken in, and nothing is written: to be asked
+ * again after the next sample. Some ten thousand operations, and 6 KB of stack for two gyros, 13 KB for three.
  */
 uint32_t trihedron_get_calibration(const trihedron_application* its, trihedron_calibration* calibration);
 
@@ -88,8 +87,8 @@ void trihedron_get_housekeeping(const trihedron_application* its, trihedron_hous
 uint64_t trihedron_save(const trihedron_application* its, void* memory, size_t size);
 
 /**
- * Restores the newest whole snapshot into an object that has been created. Its sequence number, or 0 where there is
- * none and nothing is changed. `slots`, where it is not null: two of `trihedron_snapshot`, what each slot held.
+ * Restores the newest whole snapshot into an object that has been created. Its sequence number, or 0 where there is none
+ * and nothing is changed. `slots`, where it is not null: two of `trihedron_snapshot`, what each slot held.
  */
 uint64_t trihedron_restore(trihedron_application* its, const void* memory, size_t size, uint32_t slots[2]);
 

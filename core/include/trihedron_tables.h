@@ -368,15 +368,31 @@ typedef struct trihedron_parameters {
 } trihedron_parameters;
 
 /** An initialiser; `trihedron_default_parameters()` fills in the covariance too. */
-#define TRIHEDRON_PARAMETERS_DEFAULT                                                                                \
-  {                                                                                                                 \
-    .version = TRIHEDRON_TABLES_VERSION, .gyros = 2, .gyro_period_ns = 125000000, .correction_interval_ns = 0,      \
-    .angles_after_ns = 60000000000, .required_interval_ns = 16200000000000, .window_ns = 5700000000000,             \
-    .star_tracker_timeout_ns = 60000000000, .failed_after_ns = 60000000000, .required_error_rad = 0.001454441,      \
-    .readout_noise_rad = {9.7e-6, 9.7e-6, 9.7e-6}, .star_tracker_noise_rad = {1.45e-5, 1.45e-5, 9.7e-5},            \
-    .direction_random_walk_rad_sqrt_s = 0, .gate_nis = 30, .reopen_after_rejections = 20,                           \
-    .reopen_after_jump_rejections = 400, .restart_within_fixes = 200, .aligned_after_fixes = 20, .spread_over = 20, \
-    .widen_where_correlated = 1, .drift_rad_s = {{0}}, .alignment_rad = {{0}}, .covariance = {0},                   \
+#define TRIHEDRON_PARAMETERS_DEFAULT \
+  { \
+    .version = TRIHEDRON_TABLES_VERSION, \
+    .gyros = 2, \
+    .gyro_period_ns = 125000000, \
+    .correction_interval_ns = 0, \
+    .angles_after_ns = 60000000000, \
+    .required_interval_ns = 16200000000000, \
+    .window_ns = 5700000000000, \
+    .star_tracker_timeout_ns = 60000000000, \
+    .failed_after_ns = 60000000000, \
+    .required_error_rad = 0.001454441, \
+    .readout_noise_rad = {9.7e-6, 9.7e-6, 9.7e-6}, \
+    .star_tracker_noise_rad = {1.45e-5, 1.45e-5, 9.7e-5}, \
+    .direction_random_walk_rad_sqrt_s = 0, \
+    .gate_nis = 30, \
+    .reopen_after_rejections = 20, \
+    .reopen_after_jump_rejections = 400, \
+    .restart_within_fixes = 200, \
+    .aligned_after_fixes = 20, \
+    .spread_over = 20, \
+    .widen_where_correlated = 1, \
+    .drift_rad_s = {{0}}, \
+    .alignment_rad = {{0}}, \
+    .covariance = {0}, \
   }
 /** Of the record, bytes. */
 #define TRIHEDRON_PARAMETERS_SIZE 4120u
