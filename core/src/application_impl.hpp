@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "forecast_impl.hpp"
 #include "trihedron/core/application.hpp"
@@ -158,16 +159,18 @@ void Application<Estimator>::begin() {
   forecast_ = Forecast<Estimator>(policy_.window, policy_.required_interval, policy_.required_error_rad);
   calibration_residuals_.restart();
   navigation_residuals_.restart();
-  angle_sigma_rad_ = std::numeric_limits<double>::infinity();
-  angle_off_rad_ = fixes_off_rad_ = 0;
-  fixes_to_agree_ = angle_run_ = 0;
+  forget_angles();
+  angle_t_ = angle_off_t_ = Time::min();
+  angle_off_rad_ = last_off_rad_ = fixes_off_rad_ = 0;
+  fixes_to_agree_ = 0;
+  angle_gyros_ = {};
   faults_ = 0;
   fixes_since_start_ = 0;
   refused_in_a_row_ = 0;
   unknown_until_ = Time::min();
   adoption_ = Adoption::kNone;
   held_ = false;
-  has_sample_ = false;
+  has_sample_ = has_time_ = false;
 }
 
 template <class Estimator>
@@ -194,9 +197,6 @@ StepReport Application<Estimator>::on_gyro(const GyroSample& sample) {
   }
   const StepReport report = on_board_.on_gyro(sample);
   note(report);
-  if (is_used(report.sample)) {
-    note_angles(report, sample.h_b);
-  }
   return report;
 }
 
@@ -248,59 +248,69 @@ void Application<Estimator>::note_sample(const StepReport& report) {
     attitude_t_ = shifted(attitude_t_, shift);
     set(Fault::kClockSetBack, on_board_.navigator().started());
     unknown_until_ = report.t;
+    forget_angles();
   } else if (has_sample_ && report.t - used_t_ > kLongGap) {
     detail::count_up(counts_.gaps);
     set(Fault::kGap, on_board_.navigator().started());
     unknown_until_ = report.t;
+    forget_angles();
   }
   if (!has_sample_) {
     fix_t_ = attitude_t_ = report.t;
-    has_sample_ = true;
+    has_sample_ = has_time_ = true;
   }
   now_ = used_t_ = report.t;
+  note_angles(report);
 }
 
 /// A time without samples does not count as one without attitude; nor does one that a single refused sample may have
 /// wrong.
 template <class Estimator>
 void Application<Estimator>::note_time_of_refused(const StepReport& report) {
-  if (!has_sample_) {
-    now_ = used_t_ = fix_t_ = attitude_t_ = report.t;
-    has_sample_ = true;
-  } else if (const Duration ahead = report.t - now_; ahead <= kLongGap) {
+  const Duration ahead = report.t - now_;
+  if (!has_time_) {
+    now_ = fix_t_ = attitude_t_ = report.t;
+    has_time_ = true;
+  } else if (std::chrono::abs(ahead) <= kLongGap) {
     now_ = report.t;
   } else if (refused_in_a_row_ >= kStandingStill) {
     now_ = report.t;
     attitude_t_ = shifted(attitude_t_, ahead);
-  }
-}
-
-/// Of all pairs of gyros in use.
-template <class Estimator>
-double Application<Estimator>::largest_angle_off_rad(const StepReport& report, const Directions& h_b) const {
-  const auto& its = on_board_.estimator().gyros();
-  double largest = 0;
-  for (int k = 0; k < gyros(); ++k) {
-    for (int j = k + 1; j < gyros(); ++j) {
-      if (report.gyros[k] == GyroState::kUsed && report.gyros[j] == GyroState::kUsed) {
-        const double cosine = its[k].h_in.dot(its[j].h_in);
-        const double off = cosine - its[k].in_c(h_b[k]).dot(its[j].in_c(h_b[j]));
-        largest = std::max(largest, std::abs(off) / std::sqrt(1 - cosine * cosine));
-      }
+    if (ahead < Duration::zero()) {  // the clock has been set back
+      fix_t_ = shifted(fix_t_, ahead);
+      used_t_ = shifted(used_t_, ahead);
     }
   }
-  return largest;
 }
 
-/// Whether gyros contradict each other, whatever the star tracker says. A few samples in a row tell that they do, and
-/// as many as show that nothing is read that they no longer do.
+/// Until the next fix is compared, the angles between the momenta are not known well enough.
 template <class Estimator>
-void Application<Estimator>::note_angles(const StepReport& report, const Directions& h_b) {
+void Application<Estimator>::forget_angles() {
+  angle_sigma_rad_ = std::numeric_limits<double>::infinity();
+  angle_run_ = 0;
+}
+
+/// Whether gyros contradict each other, whatever the star tracker says: where the angle between two momenta is off at a
+/// few samples in a row. It is over when it agrees for kStandingStill samples and the navigator has been corrected
+/// since, as the attitude may rest on what was wrong.
+template <class Estimator>
+void Application<Estimator>::note_angles(const StepReport& report) {
   constexpr int kToContradict = 4;
-  if (!on_board_.estimator().started()) {
+  constexpr Duration kFresh = std::chrono::minutes(2);
+  GyroMask used{};
+  bool is_one_more = false;
+  for (int k = 0; k < gyros(); ++k) {
+    used[k] = report.gyros[k] == GyroState::kUsed;
+    is_one_more = is_one_more || (used[k] && !angle_gyros_[k]);
+  }
+  angle_gyros_ = used;
+  if (is_one_more) {
+    forget_angles();
+  }
+  if (!on_board_.estimator().started() || report.t - kFresh > angle_t_) {
     return;
   }
-  const double off_rad = largest_angle_off_rad(report, h_b);
+  const double off_rad = on_board_.largest_angle_off_rad();
   double square = angle_sigma_rad_ * angle_sigma_rad_;
   for (int k = 0; k < gyros(); ++k) {
     const double noise_rad = on_board_.estimator().setup().readout_noise_rad[k];
@@ -308,18 +318,28 @@ void Application<Estimator>::note_angles(const StepReport& report, const Directi
   }
   const bool is_off = off_rad > FixReport::kContradiction * std::sqrt(square);
   const bool is_told = has(Fault::kGyrosContradict);
-  angle_run_ = is_off == is_told ? 0 : angle_run_ + 1;
-  if (angle_run_ >= (is_told ? kStandingStill : kToContradict)) {
-    set(Fault::kGyrosContradict, is_off);
+  angle_off_t_ = is_off ? report.t : angle_off_t_;
+  angle_run_ = is_off == is_told ? 0 : std::min(angle_run_ + 1, kStandingStill);
+  if (!is_told && angle_run_ >= kToContradict) {
+    set(Fault::kGyrosContradict, true);
+    on_board_.correct_at_next_fix();
+    angle_run_ = 0;
+  } else if (is_told && angle_run_ >= kStandingStill && on_board_.corrected_t() > angle_off_t_) {
+    set(Fault::kGyrosContradict, false);
     angle_run_ = 0;
   }
-  angle_off_rad_ = has(Fault::kGyrosContradict) ? std::max(angle_off_rad_, off_rad) : 0;
+  // Of two samples the smaller: a single one may be wild.
+  const double both_rad = std::min(off_rad, std::exchange(last_off_rad_, off_rad));
+  angle_off_rad_ = has(Fault::kGyrosContradict) ? std::max(angle_off_rad_, both_rad) : 0;
 }
 
 template <class Estimator>
 void Application<Estimator>::note_fix(const StepReport& report) {
-  if (report.fix.angle_sigma_rad > 0) {
+  if (report.fix.angle_sigma_rad > 0 && report.fix.t >= unknown_until_) {  // an earlier one may still have waited
     angle_sigma_rad_ = report.fix.angle_sigma_rad;
+    angle_t_ = report.fix.t;
+  } else if (is_used(report.angles.status)) {
+    angle_t_ = report.angles.t;
   }
   if (report.fix.status == FixStatus::kEstimateLost || report.angles.status == FixStatus::kEstimateLost) {
     restart();
@@ -347,7 +367,7 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
     set(Fault::kGap, false);
   }
   set(Fault::kAccuracy, false);
-  note_contradiction(report.fix);
+  note_contradiction(report);
   if (report.corrected) {
     detail::count_up(counts_.corrections);
     navigation_residuals_.restart();
@@ -387,15 +407,34 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
   }
 }
 
+/// The largest turn of all momenta together that an innovation of this length can be of: a turn θ moves two momenta at
+/// the angle α by |θ| √(1 − |cos α|) at least.
+template <class Estimator>
+double Application<Estimator>::largest_turn_rad(const StepReport& report) const {
+  const auto& its = on_board_.estimator().gyros();
+  double least = 1;
+  for (int k = 0; k < gyros(); ++k) {
+    for (int j = k + 1; j < gyros(); ++j) {
+      if (report.gyros[k] == GyroState::kUsed && report.gyros[j] == GyroState::kUsed) {
+        least = std::min(least, std::abs(its[k].h_in.dot(its[j].h_in)));
+      }
+    }
+  }
+  return report.fix.innovation.norm() / std::sqrt(std::max(1 - least, kMinSine * kMinSine / 2));
+}
+
 /// Where fixes that contradicted an adopted calibration are followed in the end, it may be the star tracker that is
 /// off. As many as it takes to believe them against a jump have to agree. Gyros that contradict each other explain it.
 template <class Estimator>
-void Application<Estimator>::note_contradiction(const FixReport& report) {
-  const bool is_followed = report.status == FixStatus::kUsedAfterReopening || report.status == FixStatus::kRestarted;
-  const bool was_adopted = adoption_ == Adoption::kDone || has(Fault::kFixesContradict);
-  if (is_followed && was_adopted && !has(Fault::kGyrosContradict)) {
-    fixes_off_rad_ = std::max(fixes_off_rad_, report.innovation.norm());
-    fixes_to_agree_ = on_board_.estimator().setup().reopen_after_jump_rejections;
+void Application<Estimator>::note_contradiction(const StepReport& report) {
+  const FixStatus status = report.fix.status;
+  if (status == FixStatus::kUsedAfterReopening || status == FixStatus::kRestarted) {
+    on_board_.correct_at_next_fix();  // the attitude may rest on what was wrong
+    const bool was_adopted = adoption_ == Adoption::kDone || has(Fault::kFixesContradict);
+    if (was_adopted && !has(Fault::kGyrosContradict) && !report.fix.gyros_contradict()) {
+      fixes_off_rad_ = std::max(fixes_off_rad_, largest_turn_rad(report));
+      fixes_to_agree_ = on_board_.estimator().setup().reopen_after_jump_rejections;
+    }
   } else if (fixes_to_agree_ > 0) {
     --fixes_to_agree_;
   }
@@ -435,7 +474,7 @@ void Application<Estimator>::restart() {
   withdraw();
   happen(Event::kFilterRestarted);
   fixes_since_start_ = 0;
-  angle_sigma_rad_ = std::numeric_limits<double>::infinity();
+  forget_angles();
 }
 
 /// At the next fix that is used.

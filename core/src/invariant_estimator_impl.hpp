@@ -513,10 +513,10 @@ void report_angles(const Layout& layout, const Gyros& gyros, const FixComparison
     for (int j = k + 1; j < layout.gyros; ++j) {
       const Eigen::Vector3d normal = gyros[k].h_in.cross(gyros[j].h_in);
       const double sine = normal.norm();
-      if (!comparison.used[k] || !comparison.used[j] || !(sine > 0)) {
+      if (!comparison.used[k] || !comparison.used[j] || !(sine >= kMinSine)) {
         continue;
       }
-      const double cosine_off = gyros[k].h_in.dot(gyros[j].h_in) - gyros[k].in_c(h_b[k]).dot(gyros[j].in_c(h_b[j]));
+      const double off_rad = std::abs(cosine_off(gyros[k], gyros[j], h_b[k], h_b[j])) / sine;
       Eigen::Vector4d towards;
       towards << comparison.gyros[k].by_phi * normal / sine, -(comparison.gyros[j].by_phi * normal) / sine;
       Eigen::Matrix4d S;
@@ -524,7 +524,7 @@ void report_angles(const Layout& layout, const Gyros& gyros, const FixComparison
           report.innovation_covariance.template block<2, 2>(2L * k, 2L * j),
           report.innovation_covariance.template block<2, 2>(2L * j, 2L * k),
           report.innovation_covariance.template block<2, 2>(2L * j, 2L * j);
-      report.angle_off_rad = std::max(report.angle_off_rad, std::abs(cosine_off) / sine);
+      report.angle_off_rad = std::max(report.angle_off_rad, off_rad);
       report.angle_sigma_rad = std::max(report.angle_sigma_rad, std::sqrt(towards.dot(S * towards)));
     }
   }

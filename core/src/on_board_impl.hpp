@@ -807,9 +807,28 @@ double OnBoard<Estimator>::angle_residual() const {
   if (!estimator_.started() || !used[0] || !used[1]) {
     return 0;
   }
+  const Directions h_b = readings_.latest_directions();
+  return cosine_off(estimator_.gyros()[0], estimator_.gyros()[1], h_b[0], h_b[1]);
+}
+
+template <class Estimator>
+double OnBoard<Estimator>::largest_angle_off_rad() const {
+  double largest = 0;
+  if (!estimator_.started() || readings_.size() == 0) {
+    return largest;
+  }
+  const GyroMask used = intake_.health().usable(t(), t());
   const auto& its = estimator_.gyros();
   const Directions h_b = readings_.latest_directions();
-  return its[0].h_in.dot(its[1].h_in) - its[0].in_c(h_b[0]).dot(its[1].in_c(h_b[1]));
+  for (int k = 0; k < gyros(); ++k) {
+    for (int j = k + 1; j < gyros(); ++j) {
+      const double sine = its[k].h_in.cross(its[j].h_in).norm();
+      if (used[k] && used[j] && sine >= kMinSine) {
+        largest = std::max(largest, std::abs(cosine_off(its[k], its[j], h_b[k], h_b[j])) / sine);
+      }
+    }
+  }
+  return largest;
 }
 
 // ---- Navigator

@@ -778,6 +778,17 @@ TEST(NoAttitude, FailsByNoSampleThatIsTheFirstOneForLong) {
   EXPECT_EQ(begun->on_gyro(first).sample, SampleStatus::kRejectedNotDirection);
   EXPECT_EQ(begun->mode(), kWaitingForFix);
 
+  // What was refused has told no time by which others would be late, or a gap.
+  for (const bool are_good : {true, false}) {
+    const auto application = test::started<PairApplication>(test::nominal_parameters());
+    application->on_gyro(first);
+    for (std::size_t i = 1; i < 8 * 70; ++i) {
+      application->on_gyro(are_good ? flight().samples[i] : without_directions(flight().samples[i]));
+    }
+    EXPECT_EQ(application->mode(), are_good ? kWaitingForFix : kFailed);
+    EXPECT_EQ(application->housekeeping().gaps, 0U);
+  }
+
   PairApplication after_gap = application_in(kCalibrating);
   after_gap.on_gyro(without_directions(flight().samples[8 * 370]));
   fly_from(flight(), 370.125, 373, after_gap);
@@ -806,17 +817,20 @@ TEST(NoAttitude, FailsByAMinuteOfSamplesAfterAGap) {
   EXPECT_EQ(application.mode(), kFailed);
 }
 
-/// Largest error of the attitude in 1-sigmas, of all axes and all samples, and whether it was there.
+/// Largest error of the attitude in 1-sigmas, of all axes and all samples, at each of which there is one with sigmas
+/// below this.
 double largest_in_sigmas(const std::vector<GyroSample>& samples, const std::vector<StarFix>& fixes, double from_s,
-                         double to_s, PairApplication& application) {
+                         double to_s, double most_rad, PairApplication& application) {
   double largest = 0;
   fly_from(samples, fixes, from_s, to_s, application, [&](const StepReport& report) {
-    const auto attitude = application.attitude();
-    if (is_used(report.sample) && attitude) {
+    if (is_used(report.sample)) {
+      const auto attitude = application.attitude();
+      ASSERT_TRUE(attitude);
       const auto i = static_cast<std::size_t>(std::lround(8 * to_seconds(report.t.time_since_epoch())));
       const Eigen::Vector3d error = test::attitude_error(flight().C_in_c_at_samples[i], *attitude);
-      largest = std::max(largest,
-                         error.cwiseQuotient(attitude->covariance_rad2.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
+      const Eigen::Vector3d sigma_rad = attitude->covariance_rad2.diagonal().cwiseSqrt();
+      EXPECT_LT(sigma_rad.maxCoeff(), most_rad);
+      largest = std::max(largest, error.cwiseQuotient(sigma_rad).cwiseAbs().maxCoeff());
     }
   });
   return largest;
@@ -846,6 +860,7 @@ TEST(GyrosContradict, ByAnAngleWhoseSigmaIsTrue) {
 
 /// Momenta whose angle is another than before: whatever the star tracker says, one of the gyros is wrong.
 TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
+  constexpr double kTenTimesTheAngle_rad = 0.03;
   const auto samples = moved_at_1500_s();
   for (const bool has_star_tracker : {true, false}) {
     const auto application = test::started<PairApplication>(test::nominal_parameters());
@@ -856,9 +871,9 @@ TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
     fly_from(samples, fixes, 1500, 1501, *application);
     EXPECT_TRUE(application->has(Fault::kGyrosContradict));
     EXPECT_EQ(application->mode(), kDegraded);
-    EXPECT_LT(largest_in_sigmas(samples, fixes, 1501, 1550, *application), 3);
-    if (has_star_tracker) {  // twenty fixes, no more, are put down to it
-      fly_from(samples, fixes, 1550, 1575, *application);
+    EXPECT_LT(largest_in_sigmas(samples, fixes, 1501, 1600, kTenTimesTheAngle_rad, *application), 5);
+    if (has_star_tracker) {  // twenty fixes are put down to it, and twenty more to the directions
+      fly_from(samples, fixes, 1600, 1635, *application);
       EXPECT_FALSE(application->has(Fault::kGyrosContradict));
       EXPECT_FALSE(application->has(Fault::kFixesContradict));
       EXPECT_EQ(application->housekeeping().withdrawals, 1U);
@@ -866,6 +881,50 @@ TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
       EXPECT_TRUE(application->has(Fault::kGyrosContradict));
     }
   }
+}
+
+/// Until then the attitude rests on what was wrong: however long the interval, and with parameters that are held.
+TEST(GyrosContradict, UntilTheNavigatorHasBeenCorrected) {
+  const auto samples = moved_at_1500_s();
+  Parameters table = test::nominal_parameters();
+  table.correction_interval_ns = Duration(std::chrono::hours(1)).count();
+  const auto application = test::started<PairApplication>(table);
+  fly_from(samples, flight().fixes, 0, 1400, *application);
+  EXPECT_EQ(application->command(Command::kHoldCalibration), Answer::kAccepted);
+  fly_from(samples, flight().fixes, 1400, 1501, *application);
+  EXPECT_TRUE(application->has(Fault::kGyrosContradict));
+  for (double t_s = 1501; application->has(Fault::kGyrosContradict) && t_s < 1700; t_s += 0.125) {
+    fly_from(samples, flight().fixes, t_s, t_s + 0.125, *application);
+  }
+  EXPECT_FALSE(application->has(Fault::kGyrosContradict));
+  EXPECT_GT(application->on_board().corrected_t(), Time(std::chrono::seconds(1550)));
+}
+
+/// Directions need not be of unit length to the last digit.
+TEST(GyrosContradict, NotByTheLengthOfTheirReadings) {
+  std::vector<GyroSample> samples = flight().samples;
+  for (GyroSample& sample : samples) {
+    sample.h_b[0] *= 1.0009;
+    sample.h_b[1] *= 1.0009;
+  }
+  const auto application = test::started<PairApplication>(test::nominal_parameters());
+  fly_from(samples, flight().fixes, 0, 1500, *application);
+  EXPECT_EQ(application->mode(), kNavigating);
+  EXPECT_EQ(application->faults(), 0U);
+}
+
+/// A gap leaves what is known of the angle; it is not compared until a fix tells it again.
+TEST(GyrosContradict, NotAfterAGapBeforeTheNextFix) {
+  const auto samples = moved_at_1500_s();
+  const auto application = test::started<PairApplication>(test::nominal_parameters());
+  fly_from(samples, flight().fixes, 0, 1490, *application);
+  fly_from(samples, kNoFixes, 1510, 1520, *application);
+  EXPECT_FALSE(application->has(Fault::kGyrosContradict));
+  EXPECT_TRUE(application->has(Fault::kGap));
+  fly_from(samples, flight().fixes, 1520, 1530, *application);
+  EXPECT_TRUE(application->has(Fault::kGyrosContradict));
+  EXPECT_EQ(application->command(Command::kReset), Answer::kAccepted);
+  EXPECT_EQ(application->faults(), 0U);
 }
 
 /// A star tracker that is off by 6′ for twenty minutes and more: followed in the end, but not believed.
@@ -883,7 +942,7 @@ TEST(FixesContradict, UntilEnoughOfThemAgree) {
   EXPECT_TRUE(application->has(Fault::kFixesContradict));
   EXPECT_FALSE(application->has(Fault::kGyrosContradict));
   EXPECT_EQ(application->mode(), kDegraded);
-  EXPECT_LT(largest_in_sigmas(flight().samples, fixes, 1570, 2700, *application), 3);
+  EXPECT_LT(largest_in_sigmas(flight().samples, fixes, 1570, 2700, 0.004, *application), 3);
   EXPECT_EQ(application->mode(), kDegraded);
   EXPECT_EQ(application->housekeeping().adopted, 0);
   fly_from(flight().samples, fixes, 2700, 2850, *application);  // 400 of them, by now

@@ -221,8 +221,8 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   }
 }
 
-// A few fixes whose covariances are far too small have nearly all of the weight, and do not show in a mean over all
-// fixes. Those told to be the most accurate are looked at by themselves; outliers are fewer than half of any group.
+// A few fixes whose covariances are far too small weigh as much as hundreds of others, and do not show in a mean over
+// all fixes. Those told to be the most accurate are looked at by themselves; outliers are fewer than half of any group.
 void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std::vector<Finding>& findings) {
   constexpr std::ptrdiff_t kFewest = 8;
   constexpr double kMoreAccurate = 0.5;  // than the fix in the middle
@@ -230,7 +230,8 @@ void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std
   constexpr double kLittleWeight = 0.01;  // of that of all fixes
   std::map<int, std::vector<const FixRecord*>> by_head;
   for (const FixRecord& fix : fixes) {
-    const bool is_judged = fix.status == FixStatus::kUsed || fix.status == FixStatus::kRejectedByGate;
+    const bool is_judged = fix.status == FixStatus::kUsed || fix.status == FixStatus::kUsedAfterWidening ||
+                           fix.status == FixStatus::kRejectedByGate;
     if (is_judged && fix.told_sigma_rad > 0 && fix.degrees_of_freedom > 0) {
       by_head[fix.head].push_back(&fix);
     }
@@ -248,6 +249,7 @@ void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std
     std::ptrdiff_t group = 0;  // the largest of which more than half are off
     std::ptrdiff_t off_in_group = 0;
     double weight = 0;  // of those used, in that of a fix in the middle
+    double weight_of_group = 0;
     for (std::ptrdiff_t i = 0; i < accurate; ++i) {
       const FixRecord& fix = *its[static_cast<std::size_t>(i)];
       off += is_off(fix) ? 1 : 0;
@@ -256,6 +258,7 @@ void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std
       if (i + 1 >= kFewest && 2 * off > i + 1 && matters) {
         group = i + 1;
         off_in_group = off;
+        weight_of_group = weight;
       }
     }
     if (group == 0) {
@@ -264,12 +267,13 @@ void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std
     const FixRecord& last = *its[static_cast<std::size_t>(group) - 1];
     const FixRecord& first = **std::ranges::min_element(its.begin(), its.begin() + group, {}, &FixRecord::t);
     add(findings, FindingCode::kFixCovariancesTooSmall,
-        "Fixes that are told to be much more accurate than the others are not: they have most of the weight, and their "
-        "errors are in the result.",
+        "Fixes that are told to be much more accurate than the others are not: they weigh more than they should, and "
+        "their errors are in the result.",
         fmt::format("star tracker {}: of {} fixes told {:.2g}″ and less, where half are told {:.2g}″ and more, {} are "
-                    "off by more than one in a hundred is by chance; the first at t_s {:.3f}",
+                    "off by more than one in a hundred is by chance; those used weigh as much as {:.0f} others; the "
+                    "first at t_s {:.3f}",
                     head + 1, group, last.told_sigma_rad / kArcsecond, middle_rad / kArcsecond, off_in_group,
-                    to_seconds(first.t - epoch)),
+                    weight_of_group, to_seconds(first.t - epoch)),
         "Correct the covariances of these fixes (cov_*), or leave out the covariances or the fixes.");
   }
 }

@@ -24,8 +24,9 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
 /// Whether errors of each star tracker are normal.
 void judge_shape_of_errors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings);
 /// Noise of the star tracker other than in the settings.
-void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std::vector<Finding>& findings);
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings);
+/// Fixes whose own covariances are far too small. `epoch`: from which times are told.
+void judge_told_covariances(const std::vector<FixRecord>& fixes, Time epoch, std::vector<Finding>& findings);
 void judge_beside_outages(const std::optional<ErrorsBesideOutages>& errors, std::vector<Finding>& findings);
 void judge_correlated_fixes(const std::vector<CorrelatedFixes>& star_trackers, std::vector<Finding>& findings);
 

@@ -51,7 +51,8 @@ void judge_prior_as_a_whole(const Pass& pass, const CalibrationRun& run, std::ve
   const Eigen::MatrixXd prior = run.known_before.covariance(rows, rows);
   Agreement agrees = agreement_with_prior(difference(run.known_before, run.calibration, states), prior,
                                           run.calibration.covariance(rows, rows), kSure);
-  if (agrees.holds() && run.by_pass_alone) {
+  const bool is_between = !agrees.holds();
+  if (!is_between && run.by_pass_alone) {
     const auto its_rows = rows_of(*run.by_pass_alone, states);
     agrees = agreement(difference(run.known_before, *run.by_pass_alone, states),
                        prior + run.by_pass_alone->covariance(its_rows, its_rows), kSure);
@@ -62,8 +63,9 @@ void judge_prior_as_a_whole(const Pass& pass, const CalibrationRun& run, std::ve
   const bool of_file = pass.settings.prior.has_value();
   add(findings, FindingCode::kPriorContradicted,
       of_file
-          ? "The pass contradicts the earlier calibration that it was given as prior: coefficients or alignments are "
-            "others by now, and the result lies between both."
+          ? fmt::format("The pass contradicts the earlier calibration that it was given as prior: coefficients or "
+                        "alignments are others by now, and the result {}.",
+                        is_between ? "lies between both" : "stayed at it, since fixes that contradict it were rejected")
           : "Coefficients and alignments together are found outside what the settings say of them before the pass, "
             "and the result is off with it.",
       fmt::format("chi-square {:.2g} of {} degrees of freedom; all but one in a million lie below {:.3g}",

@@ -48,6 +48,22 @@ CalibrationOptions with(Estimator estimator) {
 
 class FixCovariances : public testing::TestWithParam<Estimator> {};
 
+/// Of every hundredth fix it is a hundred times too small by its sigmas.
+TEST_P(FixCovariances, ThatAreFarTooSmallForbidUse) {
+  Pass pass = two_hours().pass;
+  const Eigen::Matrix3d covariance = pass.settings.star_tracker_noise_rad.cwiseAbs2().asDiagonal();
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    pass.star_tracker.covariances.push_back(told_as(i % 100 == 50 ? Eigen::Matrix3d(1e-4 * covariance) : covariance));
+  }
+  const CalibrationRun run = calibrate(pass, with(GetParam()));
+  double weight = 0;  // the batch uses hardly one of them
+  for (const FixRecord& fix : run.fixes) {
+    weight += fix.used() && fix.told_sigma_rad < 1e-6 ? 1e4 : 0;
+  }
+  EXPECT_EQ(run.calibration.verdict.has(FindingCode::kFixCovariancesTooSmall), weight > 1e4) << weight;
+  EXPECT_TRUE(navigate(pass, with(GetParam())).verdict.has(FindingCode::kFixCovariancesTooSmall));
+}
+
 TEST_P(FixCovariances, OfTheSettingsNoiseChangeNoBit) {
   Pass pass = two_hours().pass;
   const auto before = calibrate(pass, with(GetParam())).calibration;

@@ -128,7 +128,8 @@ TEST(Verdict, ForbidsFixesWhoseCovariancesAreFarTooSmall) {
   EXPECT_FALSE(verdict.trustworthy);
   EXPECT_THAT(verdict.findings.front().evidence, testing::HasSubstr("of 30 fixes told 0.031″ and less"));
   EXPECT_THAT(verdict.findings.front().evidence, testing::HasSubstr("30 are off by more than one in a hundred is by "
-                                                                    "chance; the first at t_s 300.000"));
+                                                                    "chance; those used weigh as much as 30000 others; "
+                                                                    "the first at t_s 300.000"));
   EXPECT_THAT(codes(judged(30, 1.5e-7, 100, 0)), IsEmpty());   // rejected, all of them
   EXPECT_THAT(codes(judged(30, 1.5e-7, 3.4, 30)), IsEmpty());  // and they are as accurate
   EXPECT_THAT(codes(judged(30, 1e-5, 100, 3)), IsEmpty());     // told about as accurate as the others

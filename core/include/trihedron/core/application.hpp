@@ -85,15 +85,16 @@ class Application {
   void set(Fault fault, bool is_there);
 
   void note(const StepReport& report);
-  void note_contradiction(const FixReport& report);
+  void note_contradiction(const StepReport& report);
   void note_sample(const StepReport& report);
   void note_time_of_refused(const StepReport& report);
-  void note_angles(const StepReport& report, const Directions& h_b);
-  [[nodiscard]] double largest_angle_off_rad(const StepReport& report, const Directions& h_b) const;
+  void note_angles(const StepReport& report);
+  void forget_angles();
   void note_fix(const StepReport& report);
   void note_used_fix(const StepReport& report);
   void restart();
   void note_navigated(const StepReport& report);
+  [[nodiscard]] double largest_turn_rad(const StepReport& report) const;
   void decide_on_adoption();
   void adopt();
   void hold();
@@ -110,25 +111,32 @@ class Application {
   Residuals navigation_residuals_;   ///< of the navigator from the fixes
   ApplicationPolicy policy_;
   Housekeeping
-      counts_{};       ///< the counters and the last statuses; what else a record holds is put in when it is asked for
-  Time now_{};         ///< of the latest sample whose time was accepted
-  Time used_t_{};      ///< of the latest sample used
-  Time fix_t_{};       ///< of the latest fix used; before the first, of the start
-  Time attitude_t_{};  ///< of the latest sample that gave an attitude, or could have; later by gaps since then
+      counts_{};   ///< the counters and the last statuses; what else a record holds is put in when it is asked for
+  Time now_{};     ///< of the latest sample whose time was accepted
+  Time used_t_{};  ///< of the latest sample used
+  Time fix_t_{};   ///< of the latest fix used; before the first, of the start
+  /// Of the latest sample that gave an attitude, or could have; moved on by gaps since then, which do not count.
+  Time attitude_t_{};
   Time unknown_until_ = Time::min();  ///< end of the last gap or jump of the clock
   std::uint32_t faults_ = 0;
-  double angle_sigma_rad_ = std::numeric_limits<double>::infinity();  ///< of the last fix that was compared
-  double angle_off_rad_ = 0;                                          ///< the largest since gyros contradict each other
-  double fixes_off_rad_ = 0;  ///< what fixes that were followed against an adopted calibration were off
-  int fixes_to_agree_ = 0;    ///< from now on, until they are believed
-  int angle_run_ = 0;         ///< samples in a row whose angle says otherwise than the fault
+  /// Of the angles between the momenta, by the last fix that was compared; infinite where that tells nothing of now.
+  double angle_sigma_rad_ = std::numeric_limits<double>::infinity();
+  Time angle_t_ = Time::min();      ///< when it was known, or the angles agreed without a fix
+  Time angle_off_t_ = Time::min();  ///< of the last sample whose angle was off
+  double angle_off_rad_ = 0;        ///< the largest since gyros contradict each other, of the smaller of two samples
+  double last_off_rad_ = 0;         ///< of the last sample
+  double fixes_off_rad_ = 0;        ///< what fixes that were followed against an adopted calibration were off
+  int fixes_to_agree_ = 0;          ///< from now on, until they are believed
+  int angle_run_ = 0;               ///< samples in a row whose angle says otherwise than the fault
+  GyroMask angle_gyros_{};          ///< that were used at the last sample
   int fixes_since_start_ = 0;
   int refused_in_a_row_ = 0;
   Mode mode_ = Mode::kStandby;
   Adoption adoption_ = Adoption::kNone;
   bool loaded_ = false;
   bool held_ = false;
-  bool has_sample_ = false;  ///< or one that was refused, whose time was accepted
+  bool has_sample_ = false;  ///< that was used
+  bool has_time_ = false;    ///< of a sample, used or refused
 };
 
 /// The flight computer's: two gyros with eq. (1), one star tracker.

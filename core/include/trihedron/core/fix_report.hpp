@@ -23,7 +23,8 @@ struct FixReport {
   Covariance innovation_covariance;
   double nis = 0;  ///< innovation² over its covariance; as many degrees of freedom as components
   /// What the angles between the momenta that were read are off those estimated, and the 1-sigma of that, rad; each the
-  /// largest of all pairs of gyros used. An error of the fix has no part in it. Zero where the fix was not compared.
+  /// largest of all pairs of gyros used that give an attitude. An error of the fix has no part in it. Zero where the
+  /// fix was not compared.
   double angle_off_rad = 0;
   double angle_sigma_rad = 0;
   double weight = 1;            ///< the noise was assumed 1/√weight times the nominal one; 1 without Student's t

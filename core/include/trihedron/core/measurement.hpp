@@ -26,6 +26,14 @@ using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedState
 /// The fix with what is known of its error taken off: a rotation vector, c axes, rad.
 [[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const Eigen::Vector3d& error_rad);
 
+/// Of two momenta: what the cosine of the angle between them is by the estimates, less what it is by their readings, b
+/// axes. z1 of eq. (3).
+template <class Gyro>
+[[nodiscard]] double cosine_off(const Gyro& one, const Gyro& other, const Eigen::Vector3d& one_b,
+                                const Eigen::Vector3d& other_b) {
+  return one.h_in.dot(other.h_in) - one.in_c(one_b).dot(other.in_c(other_b));
+}
+
 /// One gyro's part of a comparison: the two components of y = h × h_et across h, the first along h × (h of the next
 /// gyro), and how they change with φ (in), with the fix's error and −δ (c), and with the errors of the readout.
 struct GyroComparison {

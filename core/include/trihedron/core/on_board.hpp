@@ -90,6 +90,9 @@ class OnBoard {
   /// Of the navigator's last correction; needs navigator().started().
   [[nodiscard]] Time corrected_t() const { return corrected_t_; }
 
+  /// What the angle between two momenta is off by the latest readings, rad: the largest of all pairs of gyros that can
+  /// be used and give an attitude. Zero before the start.
+  [[nodiscard]] double largest_angle_off_rad() const;
   /// Open-loop attitude at the latest sample; kTooFew where there is none since the clock was set back. Needs
   /// navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {

@@ -21,7 +21,7 @@ using Duration = Tai::duration;
 /// Times farther from the origin, 146 years, are not accepted, so that the difference of any two can be told.
 inline constexpr Duration kMaxTime = Duration::max() / 2;
 
-/// A time within that, when the clock is set by `shift`; the end that it would pass.
+/// t + shift, or ±kMaxTime where that would be passed. |t| ≤ kMaxTime.
 [[nodiscard]] constexpr Time shifted(Time t, Duration shift) {
   const Duration since = t.time_since_epoch();
   if (shift > Duration::zero()) {
