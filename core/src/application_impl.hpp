@@ -290,13 +290,9 @@ void Application<Estimator>::forget_angles() {
   angle_run_ = 0;
 }
 
-/// Whether gyros contradict each other, whatever the star tracker says: where the angle between two momenta is off at a
-/// few samples in a row. It is over when it agrees for kStandingStill samples and the navigator has been corrected
-/// since, as the attitude may rest on what was wrong.
+/// Of a gyro that comes back the angles are not known.
 template <class Estimator>
-void Application<Estimator>::note_angles(const StepReport& report) {
-  constexpr int kToContradict = 4;
-  constexpr Duration kFresh = std::chrono::minutes(2);
+void Application<Estimator>::note_gyros(const StepReport& report) {
   GyroMask used{};
   bool is_one_more = false;
   for (int k = 0; k < gyros(); ++k) {
@@ -307,6 +303,16 @@ void Application<Estimator>::note_angles(const StepReport& report) {
   if (is_one_more) {
     forget_angles();
   }
+}
+
+/// Whether gyros contradict each other, whatever the star tracker says: where the angle between two momenta is off at a
+/// few samples in a row. It is over when it agrees for kStandingStill samples and the navigator has been corrected
+/// since, as the attitude may rest on what was wrong.
+template <class Estimator>
+void Application<Estimator>::note_angles(const StepReport& report) {
+  constexpr int kToContradict = 4;
+  constexpr Duration kFresh = std::chrono::minutes(2);
+  note_gyros(report);
   if (!on_board_.estimator().started() || report.t - kFresh > angle_t_) {
     return;
   }

@@ -88,6 +88,7 @@ class Application {
   void note_contradiction(const StepReport& report);
   void note_sample(const StepReport& report);
   void note_time_of_refused(const StepReport& report);
+  void note_gyros(const StepReport& report);
   void note_angles(const StepReport& report);
   void forget_angles();
   void note_fix(const StepReport& report);
