@@ -92,8 +92,9 @@ enum class Fault : std::uint32_t {
   kGap = 16,
   /// The star tracker has been lost for longer than the calibration keeps the required error.
   kAccuracy = 32,
-  /// The angle between two momenta is off by more than 8 sigmas: a gyro is at fault, which of two is not known. The
-  /// sigmas of the attitude have ten times the angle in them.
+  /// The angle between two momenta is off by more than 8 sigmas: a gyro is at fault, which of two is not known. Until
+  /// the angle agrees and the navigator has been corrected since, the sigmas of the attitude have ten times the angle
+  /// in them.
   kGyrosContradict = 64,
   /// Fixes contradicted the calibration adopted and were followed in the end: star tracker or gyros, which is not
   /// known. Until `reopen_after_jump_rejections` fixes were used since, the sigmas of the attitude have what the
