@@ -7,8 +7,9 @@
 
 #include "batch/drift_field.hpp"
 #include "batch/pass_setup.hpp"
-#include "choose/constancy.hpp"
 #include "choose/forecast.hpp"
+#include "choose/moves.hpp"
+#include "choose/odds_of_errors.hpp"
 #include "model/left_out.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/ground/choose/settled.hpp"

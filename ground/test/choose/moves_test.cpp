@@ -1,13 +1,9 @@
-#include "choose/constancy.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 
-#include "added_drift.hpp"
 #include "model/orbital_rate.hpp"
-#include "onboard/screen.hpp"
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 
@@ -39,7 +35,7 @@ bool names_a_change(const CalibrationRun& run) {
   return false;
 }
 
-TEST(Constancy, FindsNothingWhereNothingMoves) {
+TEST(Moves, FindsNothingWhereNothingMoves) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     EXPECT_FALSE(names_a_change(calibrated(seed, [](Scenario&) {}))) << seed;
   }
@@ -51,7 +47,7 @@ TEST(Constancy, FindsNothingWhereNothingMoves) {
 
 // A pass in which eq. (1) alone is 110 sigmas off in alignment, though it forecasts as well as more, and looks like
 // uncorrected aberration.
-TEST(Constancy, TakesDriftOutsideEq1ForWhatItIs) {
+TEST(Moves, TakesDriftOutsideEq1ForWhatItIs) {
   Scenario scenario;
   scenario.seed = 3180130578;
   scenario.duration = std::chrono::hours(9);
@@ -69,7 +65,7 @@ TEST(Constancy, TakesDriftOutsideEq1ForWhatItIs) {
   }
 }
 
-TEST(Constancy, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
+TEST(Moves, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
   const auto by_day = [](Scenario& scenario) {
     for (GyroScenario& gyro : scenario.gyros) {
       gyro.drift.thermal_fraction = 0.5;
@@ -83,7 +79,7 @@ TEST(Constancy, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
   EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
 }
 
-TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {
+TEST(Moves, NamesTheCaseThatSlippedAndWhen) {
   const CalibrationRun run = calibrated(1, [](Scenario& scenario) {
     scenario.gyros[0].mounting_change = {.step_rad = 20 * kArcsecond * kAxis, .step_at_s = kMiddle_s};
   });
@@ -98,7 +94,7 @@ TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {
   EXPECT_LT((change.size - 20 * kArcsecond * kAxis).norm(), 5 * change.sigma.norm() + 4 * kArcsecond);
 }
 
-TEST(Constancy, NamesTheStarTrackerThatSlipped) {
+TEST(Moves, NamesTheStarTrackerThatSlipped) {
   const CalibrationRun run = calibrated(2, [](Scenario& scenario) {
     scenario.star_tracker.mounting_change = {.step_rad = 20 * kArcsecond * kAxis, .step_at_s = kMiddle_s};
   });
@@ -107,7 +103,7 @@ TEST(Constancy, NamesTheStarTrackerThatSlipped) {
 }
 
 // Drift outside eq. (1), or that wanders, would be taken for so small a step, were it not between two fixes.
-TEST(Constancy, NamesMountingsThatSlipByArcsecondsAndTheSecondOfIt) {
+TEST(Moves, NamesMountingsThatSlipByArcsecondsAndTheSecondOfIt) {
   constexpr double kAt_s = 3096;
   const auto slips = [](Scenario& scenario, MountingChange& mounting, const Eigen::Vector3d& step_rad) {
     mounting = {.step_rad = step_rad, .step_at_s = kAt_s};
@@ -138,7 +134,7 @@ TEST(Constancy, NamesMountingsThatSlipByArcsecondsAndTheSecondOfIt) {
   EXPECT_EQ(of_case.gyro, 1);
 }
 
-TEST(Constancy, NamesTheStarTrackerThatTurnsSlowly) {
+TEST(Moves, NamesTheStarTrackerThatTurnsSlowly) {
   const CalibrationRun run = calibrated(3, [](Scenario& scenario) {
     scenario.star_tracker.mounting_change.rate_rad_s = 60 * kArcsecond / (2 * kMiddle_s) * kAxis;
   });
@@ -155,7 +151,7 @@ void turn_fixes(StarTrackerTelemetry& fixes, const Eigen::Vector3d& axis,
   }
 }
 
-TEST(Constancy, NamesTheStarTrackerThatCreepsOrSettlesByArcseconds) {
+TEST(Moves, NamesTheStarTrackerThatCreepsOrSettlesByArcseconds) {
   constexpr double kDuration_s = 9 * 3600;
   const auto creeps = [](double t_s) { return 6 * kArcsecond * t_s / kDuration_s; };
   const auto settles = [](double t_s) { return 8 * kArcsecond * (1 - std::exp(-t_s / (0.15 * kDuration_s))); };
@@ -178,7 +174,7 @@ CalibrationOptions with_constant_coefficients() {
   return options;
 }
 
-TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
+TEST(Moves, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
   for (const int times : {2, 3}) {
     Pass pass = sim::simulate(scenario_in_eq1(12, std::chrono::hours(4))).pass;
     const double rate_rad_s = times * orbital_rate_rad_s(pass.star_tracker);
@@ -195,7 +191,7 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
 
 // In this flight the motion moves parameters by many of their sigmas; where it is less than two, it is named as well,
 // and the result may be used.
-TEST(Constancy, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
+TEST(Moves, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
   Pass pass = sim::simulate(scenario_in_eq1(14, std::chrono::hours(6))).pass;
   const double rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
@@ -209,7 +205,7 @@ TEST(Constancy, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
   EXPECT_EQ(run.changes.front().motion, Motion::kOrbital);
 }
 
-TEST(Constancy, NamesCoefficientsThatChange) {
+TEST(Moves, NamesCoefficientsThatChange) {
   Scenario scenario = scenario_in_eq1(4, std::chrono::hours(3));
   for (GyroScenario& gyro : scenario.gyros) {
     gyro.drift.warm_up_fraction = 0.3;
@@ -231,7 +227,7 @@ void expect_within_sigmas(const Calibration& found, const Truth& truth) {
 
 // A jump by a twentieth of what coefficients are is many of the sigmas that are claimed where they are taken for
 // constant. The alignment does not suffer.
-TEST(Constancy, PutsCoefficientsThatChangeIntoTheirSigmas) {
+TEST(Moves, PutsCoefficientsThatChangeIntoTheirSigmas) {
   Scenario scenario = scenario_in_eq1(7, std::chrono::hours(6));
   for (GyroScenario& gyro : scenario.gyros) {
     gyro.drift.jump_sigma_rad_s = 1e-7;
@@ -268,7 +264,7 @@ CalibrationRun flown_with_course(Estimator estimator, const std::function<void(D
   return run;
 }
 
-TEST(Constancy, FindsTheTimeOfAWarmUp) {
+TEST(Moves, FindsTheTimeOfAWarmUp) {
   constexpr double kTime_s = 2400;
   const CalibrationRun run = flown_with_course(Estimator::kBatch, [](DriftScenario& drift) {
     drift.warm_up_fraction = 0.3;
@@ -278,7 +274,7 @@ TEST(Constancy, FindsTheTimeOfAWarmUp) {
   EXPECT_NEAR(to_seconds(run.options.further_states.change_time), kTime_s, 0.05 * kTime_s);
 }
 
-TEST(Constancy, FindsTheTimeOfAJump) {
+TEST(Moves, FindsTheTimeOfAJump) {
   constexpr double kAt_s = 2.3 * 3600;
   const CalibrationRun run = flown_with_course(Estimator::kInvariant, [](DriftScenario& drift) {
     drift.jump_sigma_rad_s = 1e-6;
@@ -288,7 +284,7 @@ TEST(Constancy, FindsTheTimeOfAJump) {
   EXPECT_NEAR(to_seconds(run.options.further_states.change_time), kAt_s, 10);
 }
 
-TEST(Constancy, NamesAxesOfAReadoutThatAreNotAtRightAngles) {
+TEST(Moves, NamesAxesOfAReadoutThatAreNotAtRightAngles) {
   const Pass given = sim::simulate(scenario_in_eq1(8, std::chrono::hours(3))).pass;
   for (const double by : {1e-4, 3e-5}) {
     Pass pass = given;
@@ -302,7 +298,7 @@ TEST(Constancy, NamesAxesOfAReadoutThatAreNotAtRightAngles) {
   }
 }
 
-TEST(Constancy, NamesReadingsThatAreNotLinear) {
+TEST(Moves, NamesReadingsThatAreNotLinear) {
   Pass pass = sim::simulate(scenario_in_eq1(8, std::chrono::hours(3))).pass;
   for (std::size_t i = 0; i < pass.gyro.h.size(); i += 3) {
     Eigen::Map<Eigen::Vector3d> h(&pass.gyro.h[i]);
@@ -313,51 +309,20 @@ TEST(Constancy, NamesReadingsThatAreNotLinear) {
   EXPECT_FALSE(run.calibration.verdict.trustworthy);
 }
 
-TEST(Constancy, NamesAberration) {
+TEST(Moves, NamesAberration) {
   const CalibrationRun run = calibrated(
       5, [](Scenario& scenario) { scenario.star_tracker.aberration = StarTrackerScenario::Aberration::kUncorrected; });
   EXPECT_TRUE(names(run, FindingCode::kAberrationNotCorrected));
   EXPECT_FALSE(run.calibration.verdict.trustworthy);
 }
 
-TEST(Constancy, NamesInertialAxesThatJump) {
+TEST(Moves, NamesInertialAxesThatJump) {
   const CalibrationRun run = calibrated(6, [](Scenario& scenario) {
     // Far from both momenta: about one of them, it could not be told from a jump of the other.
     scenario.star_tracker.inertial_step_rad = 23 * kArcsecond * Eigen::Vector3d::Ones();
     scenario.star_tracker.inertial_step_at_s = kMiddle_s;
   });
   EXPECT_TRUE(names(run, FindingCode::kInertialAxesTurned));
-}
-
-TEST(OrbitalOdds, TellAnErrorOfTheStarTrackerFromDrift) {
-  const auto odds_of = [](const Pass& pass) {
-    CalibrationOptions options = told();
-    options.estimator = Estimator::kBatch;
-    options.drift_model = kEsg7;
-    options.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
-    const Screened screened = screen(pass, options);
-    return orbital_odds(Trial(pass, screened, options));
-  };
-  const auto over_drift = [&](const Pass& pass) {
-    const OrbitalOdds odds = odds_of(pass);
-    return odds.error.by_prior_as_it_is - odds.drift.by_prior_as_it_is;
-  };
-  Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
-  const sim::SimulatedPass quiet = sim::simulate(scenario);
-  EXPECT_LT(odds_of(quiet.pass).drift.by_prior_as_it_is, -10);  // from there on it is worth a try
-  EXPECT_LT(odds_of(quiet.pass).error.value, 0);
-  Pass drifting = quiet.pass;
-  add_orbital_drift(quiet.truth, {4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 0, drifting.gyro);
-  add_orbital_drift(quiet.truth, {-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, 1, drifting.gyro);
-  EXPECT_LT(over_drift(drifting), -5);
-  // Of both momenta alike it is an error of the star tracker but in slews: neither is sure after three hours.
-  Pass alike = quiet.pass;
-  for (int k = 0; k < 2; ++k) {
-    add_orbital_drift(quiet.truth, {4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, k, alike.gyro);
-  }
-  EXPECT_LT(over_drift(alike), 5);
-  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(6, -5, 8) / 206265;
-  EXPECT_GT(over_drift(sim::simulate(scenario).pass), 5);
 }
 
 }  // namespace
