@@ -57,7 +57,8 @@ TurnFit::TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s
     : pass_(pass),
       readings_(readings),
       unknowns_{readings.gyros()},
-      turns_(turns_of(pass.star_tracker, std::max(kLag_s, to_seconds(pass.settings.star_tracker_period)))),
+      lag_s_(std::max(kLag_s, to_seconds(pass.settings.star_tracker_period))),
+      turns_(turns_of(pass.star_tracker, lag_s_)),
       x_(VectorXd::Zero(unknowns_.size())),
       prior_sigma_(unknowns_.size()) {
   x_(Unknowns::offset()) = offset_s;
@@ -134,6 +135,32 @@ bool TurnFit::converge() {
   return used_stretches() >= kLeastStretches && shown > kShown * shown_by_noise_;
 }
 
+void TurnFit::add_drift(Time t, const Directions& h, const Matrix3d& trihedron, DriftSum& sum) const {
+  for (int k = 0; k < unknowns_.gyros; ++k) {
+    const Esg7::Basis<double> rate = trihedron.transpose() * readings_.drift_basis(k, h[k]);
+    if (sum.t) {
+      sum.turned[k] += to_seconds(t - *sum.t) / 2 * (sum.rate[k] + rate);
+    } else {
+      sum.turned[k].setZero();
+    }
+    sum.rate[k] = rate;
+  }
+  sum.t = t;
+}
+
+void TurnFit::add_drift_until(Time t, double clock_s, const PerGyro<Matrix3d>& align, DriftSum& sum) const {
+  constexpr double kStep_s = 5;  // in a slew of a degree a second the rule of the trapezoid is off by 0.1 % then
+  const double span_s = sum.t ? to_seconds(t - *sum.t) : 0;
+  const Time begin = t - from_seconds(span_s);
+  const int steps = span_s < 2 * lag_s_ ? static_cast<int>(std::ceil(span_s / kStep_s)) : 0;  // no turn is longer
+  for (int i = 1; i < steps; ++i) {
+    const Time on_the_way = begin + from_seconds(span_s * i / steps);
+    if (const auto h = readings_.near(on_the_way + from_seconds(clock_s))) {
+      add_drift(on_the_way, *h, triad(align[0] * (*h)[0], align[1] * (*h)[1]), sum);
+    }
+  }
+}
+
 /// What the gyros read at each fix that step() asks for, by the clocks as they are now.
 void TurnFit::read(bool roughly) {
   const StarTrackerTelemetry& fixes = pass_.star_tracker;
@@ -145,6 +172,7 @@ void TurnFit::read(bool roughly) {
   for (int k = 0; k < unknowns_.gyros; ++k) {
     align[k] = Rot<C, C>::exp(Vec<C>::assume(x_.segment<3>(unknowns_.alignment(k)))).raw();
   }
+  DriftSum drift;
   std::size_t from = 0;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!needed[i]) {
@@ -174,6 +202,9 @@ void TurnFit::read(bool roughly) {
       at.aligned_rate[k] = align[k] * rate;
     }
     at.trihedron = triad(align[0] * at.h[0], align[1] * at.h[1]);
+    add_drift_until(fixes.t[i], clock_s, align, drift);
+    add_drift(fixes.t[i], at.h, at.trihedron, drift);
+    at.turned = drift.turned;
   }
 }
 
@@ -185,7 +216,6 @@ bool TurnFit::rows_of(const Turn& turn, bool roughly, Rows& rows, double& noise_
   if (!first.is_there || !second.is_there) {
     return false;
   }
-  const double span_s = to_seconds(turn.second - turn.first);
   const double ages_s[] = {to_seconds(turn.first - middle_), to_seconds(turn.second - middle_)};
   const Matrix3d back = turn.C_first_second.transpose();
   // Derivatives at the turn by the gyros: the noise of that by the fixes is in the residual as well, and their
@@ -204,8 +234,7 @@ bool TurnFit::rows_of(const Turn& turn, bool roughly, Rows& rows, double& noise_
     Eigen::Matrix<double, 2, 3> across;
     across.row(0) = h2.unitOrthogonal().transpose();
     across.row(1) = h2.cross(across.row(0).transpose()).transpose();
-    const Esg7::Basis<double> by_drift =
-        span_s / 2 * (smooth * readings_.drift_basis(k, first.h[k]) + readings_.drift_basis(k, second.h[k]));
+    const Esg7::Basis<double> by_drift = second.trihedron * (second.turned[k] - first.turned[k]);
     const Vector3d drift = by_drift * x_.segment<Esg7::kSize>(unknowns_.drift(k));
     const Vector3d off = h2 - back * h1 - drift.cross(h2);
     auto its = rows.middleRows<2>(2L * k);

@@ -101,9 +101,21 @@ class TurnFit {
     Directions aligned;  ///< and by how late each gyro is
     Directions aligned_rate;
     Eigen::Matrix3d trihedron;
+    /// By each coefficient of eq. (1): how far the drift has turned each momentum since the first fix, in axes of the
+    /// trihedron.
+    PerGyro<Esg7::Basis<double>> turned;
+  };
+  /// That sum on its way along the pass.
+  struct DriftSum {
+    std::optional<Time> t;
+    PerGyro<Esg7::Basis<double>> rate;
+    PerGyro<Esg7::Basis<double>> turned;
   };
 
   void read(bool roughly);
+  void add_drift(Time t, const Directions& h, const Eigen::Matrix3d& trihedron, DriftSum& sum) const;
+  /// Goes on to a fix by the readings on the way, where it is far.
+  void add_drift_until(Time t, double clock_s, const PerGyro<Eigen::Matrix3d>& align, DriftSum& sum) const;
   [[nodiscard]] bool rows_of(const Turn& turn, bool roughly, Rows& rows, double& noise_square) const;
   [[nodiscard]] bool step(bool roughly);
   [[nodiscard]] int size() const { return static_cast<int>(x_.size()); }
@@ -130,6 +142,7 @@ class TurnFit {
   const GyroReadings& readings_;
   Unknowns unknowns_;
   std::optional<Stepping> stepping_;
+  double lag_s_;
   std::vector<Turn> turns_;
   Eigen::VectorXd x_;
   Eigen::VectorXd prior_sigma_;

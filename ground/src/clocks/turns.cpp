@@ -99,6 +99,13 @@ std::optional<Directions> GyroReadings::sample(std::size_t i) const {
   return h_c;
 }
 
+std::optional<Directions> GyroReadings::near(Time t) const {
+  const auto& stamps = pass_.gyro.t;
+  const auto found = std::ranges::lower_bound(stamps, t);
+  const bool is_near = found != stamps.end() && std::chrono::abs(*found - t) <= reach_;
+  return is_near ? sample(static_cast<std::size_t>(found - stamps.begin())) : std::nullopt;
+}
+
 std::optional<FittedDirections> GyroReadings::at(Time t, std::size_t& from) const {
   const auto& stamps = pass_.gyro.t;
   while (from > 0 && stamps[from - 1] >= t - reach_) {

@@ -47,6 +47,9 @@ class GyroReadings {
   /// One sample; nothing where a reading is none.
   [[nodiscard]] std::optional<Directions> sample(std::size_t i) const;
 
+  /// The sample at `t` or the first after it, within reach().
+  [[nodiscard]] std::optional<Directions> near(Time t) const;
+
   /// By a parabola through the samples around `t`, with rates. Asked for with times that mostly increase: `from` is
   /// where the samples were the last time.
   [[nodiscard]] std::optional<FittedDirections> at(Time t, std::size_t& from) const;

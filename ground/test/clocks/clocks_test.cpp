@@ -93,6 +93,22 @@ TEST(Clocks, OfAGyroThatIsLateAreFound) {
   }
 }
 
+TEST(Clocks, OfGyrosThatDriftInSlewsAgree) {
+  for (const Duration fix_period : {Duration(std::chrono::seconds(3)), Duration(std::chrono::minutes(1))}) {
+    for (const std::uint64_t seed : {6U, 7U}) {
+      Scenario scenario = four_hours(seed);
+      scenario.star_tracker_period = fix_period;
+      for (GyroScenario& gyro : scenario.gyros) {
+        gyro.readout.noise_rad = 0.1 / 206265;
+      }
+      const Clocks clocks = clocks_of(scenario);
+      const Measured& late = clocks.late_s[1 - clocks.reference];
+      expect_within(late, 0, kSigmas);
+      EXPECT_LT(late.sigma, 1e-4) << to_seconds(fix_period) << " s, seed " << seed;
+    }
+  }
+}
+
 TEST(Clocks, OfThreeGyrosTheOneThatDiffersIsLate) {
   Scenario scenario = four_hours(10);
   scenario.gyros.push_back(scenario.gyros[0]);
