@@ -819,8 +819,9 @@ TEST(NoAttitude, FailsByAMinuteOfSamplesAfterAGap) {
 
 /// Largest error of the attitude in 1-sigmas, of all axes and all samples, at each of which there is one with sigmas
 /// below this.
+template <class Application>
 double largest_in_sigmas(const std::vector<GyroSample>& samples, const std::vector<StarFix>& fixes, double from_s,
-                         double to_s, double most_rad, PairApplication& application) {
+                         double to_s, double most_rad, Application& application) {
   double largest = 0;
   fly_from(samples, fixes, from_s, to_s, application, [&](const StepReport& report) {
     if (is_used(report.sample)) {
@@ -883,6 +884,25 @@ TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
       EXPECT_TRUE(application->has(Fault::kGyrosContradict));
     }
   }
+}
+
+TEST(GyrosContradict, OfThreeUntilOneIsLeftOut) {
+  constexpr double kTenTimesTheAngle_rad = 0.03;
+  constexpr double kSigmas = 5;
+  auto samples = test::with_third_gyro(flight(), Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
+  for (std::size_t i = 8 * 1500; i < samples.size(); ++i) {
+    samples[i].h_b[2] = test::turn(0.002, -0.001, 0.002) * samples[i].h_b[2];
+  }
+  const auto application = test::started<TrioApplication>(test::nominal_parameters(3));
+  fly_from(samples, flight().fixes, 0, 1500, *application);
+  ASSERT_EQ(application->mode(), kNavigating);
+  fly_from(samples, flight().fixes, 1500, 1501, *application);
+  EXPECT_TRUE(application->has(Fault::kGyrosContradict));
+  EXPECT_LT(largest_in_sigmas(samples, flight().fixes, 1501, 1560, kTenTimesTheAngle_rad, *application), kSigmas);
+  EXPECT_EQ(application->housekeeping().gyros[2], TRIHEDRON_GYRO_ISOLATED);
+  EXPECT_FALSE(application->has(Fault::kGyrosContradict));
+  EXPECT_LT(largest_in_sigmas(samples, flight().fixes, 1560, 2000, 60 * kArcsecond, *application), kSigmas);
+  EXPECT_EQ(application->housekeeping().withdrawals, 0U);
 }
 
 /// Until then the attitude rests on what was wrong: however long the interval, and with parameters that are held.
@@ -950,6 +970,30 @@ TEST(FixesContradict, UntilEnoughOfThemAgree) {
   fly_from(flight().samples, fixes, 2700, 2850, *application);  // 400 of them, by now
   EXPECT_FALSE(application->has(Fault::kFixesContradict));
   EXPECT_NE(application->mode(), kDegraded);
+}
+
+/// The second time soon after the first: the filter restarts, and as many have to agree from then on.
+TEST(FixesContradict, AlsoAfterARestart) {
+  std::vector<StarFix> fixes = flight().fixes;
+  for (StarFix& fix : fixes) {
+    const double times = fix.t >= Time(std::chrono::seconds(1650)) ? -1 : fix.t >= Time(std::chrono::seconds(1500));
+    fix.q_in_c = fix.q_in_c * Eigen::Quaterniond(test::turn(times * 0.001, times * -0.001, times * 0.001));
+  }
+  const auto application = test::started<PairApplication>(test::nominal_parameters());
+  std::vector<FixStatus> followed;
+  fly_from(flight().samples, fixes, 0, 1720, *application, [&](const StepReport& report) {
+    if (report.fix.status == FixStatus::kUsedAfterReopening || report.fix.status == FixStatus::kRestarted) {
+      followed.push_back(report.fix.status);
+    }
+  });
+  ASSERT_GE(followed.size(), 2U);
+  EXPECT_EQ(followed.front(), FixStatus::kUsedAfterReopening);
+  EXPECT_EQ(followed.back(), FixStatus::kRestarted);
+  EXPECT_LT(largest_in_sigmas(flight().samples, fixes, 1720, 2800, 0.01, *application), 3);
+  EXPECT_TRUE(application->has(Fault::kFixesContradict));
+  EXPECT_EQ(application->housekeeping().adopted, 0);
+  fly_from(flight().samples, fixes, 2800, 2950, *application);
+  EXPECT_FALSE(application->has(Fault::kFixesContradict));
 }
 
 TEST(NoAttitude, BeforeASampleHasBeenUsedByTheClockThatHasBeenSetBack) {
