@@ -814,7 +814,7 @@ double OnBoard<Estimator>::angle_residual() const {
 template <class Estimator>
 double OnBoard<Estimator>::largest_angle_off_rad() const {
   double largest = 0;
-  if (!estimator_.started() || readings_.size() == 0) {
+  if (readings_.size() == 0) {
     return largest;
   }
   const GyroMask used = intake_.health().usable(t(), t());

@@ -972,6 +972,25 @@ TEST(FixesContradict, UntilEnoughOfThemAgree) {
   EXPECT_NE(application->mode(), kDegraded);
 }
 
+/// Gyros that are not used have no part in how far the fixes are off.
+TEST(FixesContradict, TheGyrosThatAreUsed) {
+  const auto samples = test::with_third_gyro(flight(), Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
+  std::vector<StarFix> fixes = flight().fixes;
+  for (StarFix& fix : fixes) {
+    if (fix.t >= Time(std::chrono::seconds(1500))) {
+      fix.q_in_c = fix.q_in_c * Eigen::Quaterniond(test::turn(0.001, -0.001, 0.001));
+    }
+  }
+  for (const std::uint32_t selected : {0b011U, 0b110U}) {
+    const auto application = test::started<TrioApplication>(test::nominal_parameters(3));
+    fly_from(samples, fixes, 0, 100, *application);
+    ASSERT_EQ(application->command(Command::kSelectGyros, selected), Answer::kAccepted);
+    fly_from(samples, fixes, 100, 1570, *application);
+    EXPECT_TRUE(application->has(Fault::kFixesContradict));
+    EXPECT_LT(largest_in_sigmas(samples, fixes, 1570, 2000, 0.01, *application), 3);
+  }
+}
+
 /// The second time soon after the first: the filter restarts, and as many have to agree from then on.
 TEST(FixesContradict, AlsoAfterARestart) {
   std::vector<StarFix> fixes = flight().fixes;
@@ -1010,6 +1029,7 @@ TEST(NoAttitude, BeforeASampleHasBeenUsedByTheClockThatHasBeenSetBack) {
   EXPECT_FALSE(application.attitude());
   EXPECT_FALSE(application.on_board().navigation_attitude());
   EXPECT_EQ(application.on_board().t(), samples[15].t);
+  EXPECT_EQ(application.on_board().largest_angle_off_rad(), 0);
   EXPECT_EQ(application.housekeeping().attitude_valid, 0);
   EXPECT_EQ(application.command(Command::kSelectGyros, 0b11), Answer::kMomentaNearlyParallel);
   EXPECT_EQ(application.on_gyro(samples[16]).sample, SampleStatus::kUsedAfterClockSetBack);

@@ -15,6 +15,7 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "calibrate/beside_outages.hpp"
+#include "calibrate/bursts.hpp"
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
 #include "calibrate/correlated_fixes.hpp"
@@ -514,8 +515,10 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   begin_stage(progress, "looks at the clocks");
   const std::optional<RegularStamps> regular = regular_stamps(as_given);
   const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
-  const Pass& in_time = with_regular ? *with_regular : as_given;
   const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
+  const Pass& with_bursts = with_regular ? *with_regular : as_given;
+  const std::optional<WithoutBursts> rest = finds_noise ? without_bursts(with_bursts) : std::nullopt;
+  const Pass& in_time = rest ? rest->pass : with_bursts;
   const std::optional<ReadoutNoise> noise = finds_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
@@ -561,6 +564,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   run.corrected_step = step;
   run.clock_correction = correction;
   run.readout_noise = noise;
+  if (rest) {
+    run.bursts = rest->bursts;
+  }
   run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
   add_to_estimates(correction, run.calibration.further);
   run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
@@ -582,7 +588,9 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     corrected = pass;
     correct(*corrected, correction);
   }
-  const Pass& in_time = corrected ? *corrected : pass;
+  const Pass& with_bursts = corrected ? *corrected : pass;
+  const std::optional<WithoutBursts> rest = options.find_noise ? without_bursts(with_bursts) : std::nullopt;
+  const Pass& in_time = rest ? rest->pass : with_bursts;
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
@@ -615,6 +623,9 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   }
   run.clock_correction = correction;
   run.readout_noise = noise;
+  if (rest) {
+    run.bursts = rest->bursts;
+  }
   if (independent) {
     run.correlated_fixes = independent->left_out;
   }

@@ -22,8 +22,8 @@ using Eigen::VectorXd;
 namespace {
 
 // What may be expected of each, 1-sigma: a case or a head that slips, a good one that creeps or goes to and fro,
-// coefficients that change by a tenth of what is expected of them, scales as of a first ground calibration, or of better
-// ones, errors of readings by direction.
+// coefficients that change by a tenth of what is expected of them, scales as of a first ground calibration, or of
+// better ones, errors of readings by direction.
 constexpr double kSlips_rad = 60 * kArcsecond;
 constexpr double kCreeps_rad = 5 * kArcsecond;
 constexpr double kPartOfCoefficients = 0.1;

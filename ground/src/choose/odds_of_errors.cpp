@@ -92,7 +92,8 @@ OrbitalOdds orbital_odds(const Trial& trial) {
     add_error_at(phase, rows, layout, shapes.middleCols<kOfSineAndCosine>(kOfSineAndCosine * moment.fix->fix.head));
     const Eigen::Quaterniond q_in_c = moment.fix->fix.q_in_c.normalized();
     drift.go_to(moment.t, q_in_c);
-    const Eigen::Matrix<double, 3, kOfSineAndCosine> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
+    const Eigen::Matrix<double, 3, kOfSineAndCosine> turned_c =
+        q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
     for (int k = 0; k < gyros; ++k) {
       const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
       shapes.middleCols<kOfSineAndCosine>(errors + kOfSineAndCosine * k) = by_alignment.lazyProduct(turned_c);

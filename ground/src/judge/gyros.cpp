@@ -143,6 +143,18 @@ void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   }
 }
 
+void judge_bursts(const std::optional<Bursts>& bursts, std::vector<Finding>& findings) {
+  if (bursts) {
+    add(findings, FindingCode::kGyroReadingsLeftOut,
+        "For moments of up to some seconds the readings of a gyro were wrong: the angle between the momenta left its "
+        "course and came back. These samples were left out. Where the readings were off across that angle it does not "
+        "show, and the attitude there is off with them.",
+        fmt::format("{} times, {} samples; the angle was off by up to {}", bursts->bursts, bursts->samples,
+                    angle_text(bursts->largest_rad)),
+        "Look for what disturbs the readout: charging, saturation, telemetry that mixes packets.");
+  }
+}
+
 void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<Finding>& findings) {
   if (noise) {
     const auto text = [&](const PerGyro<double>& noise_rad) {

@@ -22,6 +22,18 @@
 
 namespace trihedron {
 
+/// Shared states, as many as there is room for. Written out in the estimator, by a condition on its capacity, GCC 12
+/// leaves the function that returns it out of an explicit instantiation.
+template <int kMost>
+struct SharedVector {
+  using Type = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
+};
+/// Eigen's vector of a size up to none has no column either.
+template <>
+struct SharedVector<0> {
+  using Type = Eigen::Matrix<double, 0, 1>;
+};
+
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c
 /// δ_k) × ω. The attitude in H is not the tracker's but the fused one, so that noise does not pass for information. The
 /// terms of second order, ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the
@@ -46,9 +58,7 @@ class InvariantEstimator {
   using Information = SquareRootInformation<kMaxStates, kMaxDynamic>;
   using Vector = typename Information::Vector;
   using Rows3 = StateRows3<kMaxStates>;
-  // Where there is room for none the size is fixed: Eigen's vector of a size up to none has no column either.
-  using Shared =
-      Eigen::Matrix<double, kCapacity.shared_states == 0 ? 0 : Eigen::Dynamic, 1, 0, kCapacity.shared_states, 1>;
+  using Shared = typename SharedVector<kCapacity.shared_states>::Type;
 
   /// Makes it ready. `prior`: means of drift coefficients, alignments, biases; the momenta come from the first fix.
   /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Behind

@@ -91,7 +91,7 @@ class OnBoard {
   [[nodiscard]] Time corrected_t() const { return corrected_t_; }
 
   /// What the angle between two momenta is off by the latest readings, rad: the largest of all pairs of gyros that can
-  /// be used and give an attitude. Zero before the start.
+  /// be used and give an attitude. Zero where there is none since the clock was set back; needs a started estimator.
   [[nodiscard]] double largest_angle_off_rad() const;
   /// Open-loop attitude at the latest sample; kTooFew where there is none since the clock was set back. Needs
   /// navigator().started().

@@ -153,6 +153,13 @@ struct ReadoutNoise {
   }
 };
 
+/// Readings by which the angle between two momenta was off for a moment, and which were left out.
+struct Bursts {
+  long bursts = 0;
+  long samples = 0;        ///< of all
+  double largest_rad = 0;  ///< mean of the burst in which the angle was off most
+};
+
 /// What a star tracker is off beside its outages, by the attitude without these fixes.
 struct ErrorsBesideOutages {
   int outages = 0;
@@ -197,6 +204,7 @@ struct CalibrationRun {
   ClockCorrection clock_correction;                   ///< of the stamps, made before the calibration
   double gyro_stamps_off_s = 0;                       ///< rms off the regular times that were used in their place, or 0
   std::optional<ReadoutNoise> readout_noise;          ///< that was used in the place of that of the settings
+  std::optional<Bursts> bursts;                       ///< readings that were left out
   std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
   std::vector<CorrelatedFixes> correlated_fixes;      ///< of the star trackers of which fixes were left out for it
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
@@ -250,6 +258,7 @@ struct NavigationRun {
   ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use
   double gyro_stamps_off_s = 0;               ///< rms off the regular times that the samples are of, or 0
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
+  std::optional<Bursts> bursts;               ///< readings that were left out
   std::vector<CorrelatedFixes> correlated_fixes;  ///< of the star trackers of which fixes were left out for it
   std::optional<Clocks> clocks;                   ///< where the pass shows them, behind this correction
   bool has_clock_state = false;                   ///< an offset of the star tracker's clock is estimated along
