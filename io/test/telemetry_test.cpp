@@ -718,6 +718,8 @@ TEST(Telemetry, AWrongRangeIsRefused) {
   selection.from = sample_calibration().epoch + std::chrono::seconds(31);
   EXPECT_NE(refusal([&] { static_cast<void>(foreign.load(selection)); }).find("less than a minute of the pass"),
             std::string::npos);
+  selection.to = *selection.from - std::chrono::seconds(1);
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load(selection)); }).find("before it begins"), std::string::npos);
 }
 
 TEST(Telemetry, WrongIntervalsAreRefused) {

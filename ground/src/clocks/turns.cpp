@@ -174,6 +174,9 @@ Matrix3d triad(const Vector3d& h1, const Vector3d& h2) {
 
 double rough_offset_s(const Pass& pass, const GyroReadings& readings, double finest_s) {
   constexpr std::size_t kMostTurns = 4000;
+  constexpr double kClear = 8;
+  constexpr double kNoOther = 0.7;
+  constexpr double kApart_s = 30;
   const double period_s = std::max(to_seconds(pass.settings.star_tracker_period), finest_s);
   const double step_s =
       std::max(period_s / std::ceil(period_s / (2 * finest_s)), to_seconds(pass.settings.gyro_period));
@@ -231,9 +234,15 @@ double rough_offset_s(const Pass& pass, const GyroReadings& readings, double fin
   std::ranges::sort(sorted);
   const double usual = sorted[sorted.size() / 2];
   const double spread = usual - sorted[sorted.size() / 4];
-  // The quartiles of lags that are all wrong are apart by chance alone; the right one lies far below them.
-  constexpr double kClear = 8;
-  const bool is_clear = std::isfinite(usual) && usual - *best > kClear * spread;
+  double elsewhere = std::numeric_limits<double>::infinity();  // where no slew of half a minute is the same one
+  for (auto cost = costs.begin(); cost != costs.end(); ++cost) {
+    if (std::abs(static_cast<double>(cost - best)) * step_s > kApart_s) {
+      elsewhere = std::min(elsewhere, *cost);
+    }
+  }
+  // The quartiles of lags that are all wrong are apart by chance alone; the right one lies far below them. Where slews
+  // take much of the time or come in a rhythm, these are far apart, but no other lag is nearly as good.
+  const bool is_clear = std::isfinite(usual) && (usual - *best > kClear * spread || *best < kNoOther * elsewhere);
   return is_clear ? static_cast<double>(best - costs.begin() - farthest) * step_s : 0;
 }
 

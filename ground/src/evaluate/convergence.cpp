@@ -65,8 +65,9 @@ std::optional<Duration> settled(const CalibrationRun& run, const std::vector<Con
                                 bool alignments) {
   std::optional<Duration> last;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!parameters[i].determined || !parameters[i].followed ||
-        run.calibration.states[i].is_alignment() != alignments) {
+    const ParameterId& state = run.calibration.states[i];
+    const bool is_wanted = alignments ? state.is_alignment() : state.is_drift() && state.coefficient.is_in_eq1();
+    if (!is_wanted || !parameters[i].determined || !parameters[i].followed) {
       continue;
     }
     if (!parameters[i].settled) {

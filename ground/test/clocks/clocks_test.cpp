@@ -68,6 +68,21 @@ TEST(Clocks, OfAStarTrackerSecondsOrMinutesOffAreFound) {
   }
 }
 
+/// As of a telemetry map that takes one time scale for another.
+TEST(Clocks, FarApartAreFoundWhereSlewsComeInARhythm) {
+  for (const double offset_s : {33.0, -100.0}) {
+    Scenario scenario = four_hours(7);
+    std::vector<Slew> slews;
+    for (int minutes = 5; minutes < 235; minutes += 15) {
+      slews.push_back({60.0 * minutes, 0.5, 0.1, 0});
+      slews.push_back({60.0 * (minutes + 4), 0, 0, 0});
+    }
+    scenario.attitude.slews = slews;
+    scenario.star_tracker.clock_offset_s = offset_s;
+    expect_within(clocks_of(scenario).mid_offset_s, offset_s, kSigmas);
+  }
+}
+
 TEST(Clocks, OfAnotherRateAreFound) {
   for (const double rate : {1e-4, -1e-5, 1e-6}) {
     Scenario scenario = four_hours(8);

@@ -82,6 +82,17 @@ TEST(Convergence, IsNotThatOfAParameterThatTheOnBoardStepDoesNotEstimate) {
   EXPECT_EQ(settled(run, parameters, false), minutes(20));
 }
 
+/// Members outside eq. (1) are estimated to protect the others.
+TEST(Convergence, OfTheCoefficientsIsThatOfEq1) {
+  CalibrationRun run = three_parameters();
+  run.calibration.states[1] = parameter("gyro1.W(3,1)");
+  run.calibration.covariance(1, 1) = 0.01;
+  auto parameters = convergence(run, nullptr);
+  ASSERT_TRUE(parameters[1].determined && parameters[1].followed);
+  parameters[1].settled.reset();
+  EXPECT_EQ(settled(run, parameters, false), minutes(20));
+}
+
 TEST(Convergence, IsUnknownWithoutAHistory) {
   CalibrationRun run = three_parameters();
   run.parameters = {};

@@ -28,8 +28,8 @@ struct Convergence {
 /// One per row of Calibration::states; error against `truth`, or else against the final value.
 [[nodiscard]] std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* truth);
 
-/// Of the determined and followed alignments, or else drift coefficients: when the last one settled. Absent where one
-/// has not, or there is none.
+/// Of the determined and followed alignments, or else drift coefficients of eq. (1): when the last one settled. Absent
+/// where one has not, or there is none.
 [[nodiscard]] std::optional<Duration> settled(const CalibrationRun& run, const std::vector<Convergence>& parameters,
                                               bool alignments);
 
