@@ -154,7 +154,13 @@ std::vector<double> angles_between(const GyroReadings& readings, int one, int ot
   constexpr double kOutlier = 4;
   std::vector<double> angles_rad(readings.size(), kNaN);
   std::vector<Eigen::Vector3d> axes_c(readings.size(), Eigen::Vector3d::Zero());
+  const auto repeats = [&](std::size_t i, int gyro) {
+    return i > 0 && readings.reading(i, gyro) == readings.reading(i - 1, gyro);
+  };
   for (std::size_t i = 0; i < angles_rad.size(); ++i) {
+    if (repeats(i, one) || repeats(i, other)) {
+      continue;
+    }
     if (const auto a = readings.reading(i, one), b = readings.reading(i, other); a && b) {
       const Eigen::Vector3d normal = a->cross(*b);
       axes_c[i] = normal.normalized();
@@ -215,6 +221,19 @@ Span widened(Span burst, const std::vector<double>& off, double sigma) {
   return {burst.begin - std::min<std::size_t>(burst.begin, 1), std::min(burst.end + 1, off.size())};
 }
 
+/// Whether most of these samples are off, and to the same side: not some wild ones among good ones.
+bool is_of_most(const Span& burst, const std::vector<double>& off) {
+  const auto its = std::span(off).subspan(burst.begin, burst.size());
+  double sum = 0;
+  for (const double each : its) {
+    sum += each;
+  }
+  std::vector<double> sorted(its.begin(), its.end());
+  std::ranges::sort(sorted, [&](double a, double b) { return sum > 0 ? a < b : a > b; });
+  const double middle = sorted[(sorted.size() - 1) / 2];
+  return 2 * middle * static_cast<double>(its.size()) / sum > 1;
+}
+
 /// Of one angle over a span without gaps. `told_rad`: 1-sigma of a reading of it.
 std::vector<Burst> bursts_in(std::span<const double> angles_rad, double period_s, double told_rad) {
   const OffCourse course(angles_rad, period_s);
@@ -238,10 +257,11 @@ std::vector<Burst> bursts_in(std::span<const double> angles_rad, double period_s
   const SigmaOfSums of_one(off, period_s, told_rad);
   const auto longest = static_cast<std::size_t>(kLongestBurst_s / period_s);
   for (Burst burst : likely) {
+    const bool is_even = is_of_most(burst.samples, off);
     burst.samples = widened(burst.samples, off, of_one.at(burst.samples.begin));
     const std::span taken = std::span(is_taken).subspan(burst.samples.begin, burst.samples.size());
     const bool comes_back = std::abs(course.step_over(burst.samples)) < burst.off_rad / 2;
-    if (std::ranges::count(taken, 1) == 0 && comes_back && burst.samples.size() <= longest + 2) {
+    if (std::ranges::count(taken, 1) == 0 && comes_back && is_even && burst.samples.size() <= longest + 2) {
       std::ranges::fill(taken, 1);
       bursts.push_back(burst);
     }

@@ -588,9 +588,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     corrected = pass;
     correct(*corrected, correction);
   }
-  const Pass& with_bursts = corrected ? *corrected : pass;
-  const std::optional<WithoutBursts> rest = options.find_noise ? without_bursts(with_bursts) : std::nullopt;
-  const Pass& in_time = rest ? rest->pass : with_bursts;
+  const Pass& in_time = corrected ? *corrected : pass;
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
@@ -623,8 +621,10 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   }
   run.clock_correction = correction;
   run.readout_noise = noise;
-  if (rest) {
-    run.bursts = rest->bursts;
+  if (options.find_noise) {  // they stay: what follows them is not known yet where an attitude is given
+    if (const std::optional<WithoutBursts> rest = without_bursts(in_time)) {
+      run.bursts = rest->bursts;
+    }
   }
   if (independent) {
     run.correlated_fixes = independent->left_out;

@@ -87,15 +87,15 @@ class ChangeSearch {
 
   /// Mountings, coefficients, and the momentum, or the inertial axes, that jump between two stretches.
   void try_steps(int gyro) {
-    for (Index step = 0; step < pass_.steps(); ++step) {
-      const Jump jump{pass_.middle(step), pass_.middle(step + 1)};
-      const VectorXd there = once_at(step);
+    for (Index at = 0; at < pass_.steps(); ++at) {
+      const Jump jump{pass_.middle(at), pass_.middle(at + 1)};
+      const VectorXd there = once_at(at);
       for (const double rad : {kSlips_rad, kCreeps_rad}) {
-        consider(this->step(mounting_of(gyro), gyro, jump), alignments_along(gyro, there), sigmas(3, rad));
+        consider(step(mounting_of(gyro), gyro, jump), alignments_along(gyro, there), sigmas(3, rad));
       }
-      consider(this->step(Moving::kCoefficients, gyro, jump), coefficients_along(gyro, there), coefficients_of(gyro));
-      const Entries entries = gyro == kAll ? turn_of_axes(step) : columns_from(pass_.momentum(step, gyro), 2);
-      consider(this->step(momentum_of(gyro), gyro, jump), entries, sigmas(gyro == kAll ? 3 : 2, kSlips_rad));
+      consider(step(Moving::kCoefficients, gyro, jump), coefficients_along(gyro, there), coefficients_of(gyro));
+      const Entries entries = gyro == kAll ? turn_of_axes(at) : columns_from(pass_.momentum(at, gyro), 2);
+      consider(step(momentum_of(gyro), gyro, jump), entries, sigmas(gyro == kAll ? 3 : 2, kSlips_rad));
     }
   }
 

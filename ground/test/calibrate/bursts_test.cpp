@@ -60,9 +60,17 @@ TEST(Bursts, AreLeftOut) {
 
     const CalibrationRun run = calibrate(pass, {});
     EXPECT_TRUE(run.calibration.verdict.trustworthy);
-    EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kGyroReadingsLeftOut));
+    EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kGyroReadingsWrong));
     EXPECT_LT(part_beyond_4_sigmas(run.attitude, flown.truth), 1e-3);
   }
+}
+
+TEST(Bursts, ForbidTheUseOfANavigation) {
+  const sim::SimulatedPass flown = sim::simulate(scenario_in_eq1(3, std::chrono::hours(1)));
+  EXPECT_FALSE(navigate(flown.pass, {}).verdict.has(FindingCode::kGyroReadingsWrong));
+  const NavigationRun run = navigate(with_bursts(flown.pass, 1, 8, 1e-3), {});
+  EXPECT_TRUE(run.verdict.has(FindingCode::kGyroReadingsWrong));
+  EXPECT_FALSE(run.verdict.trustworthy);
 }
 
 TEST(Bursts, OfOneOfThreeGyrosLeaveTheOthers) {
@@ -92,6 +100,17 @@ TEST(Bursts, AreNotSeenWhereThereAreNone) {
     scenario.gyros[1].readout.latency_s = 0.01;
     EXPECT_FALSE(without_bursts(sim::simulate(scenario).pass)) << seed;
   }
+}
+
+/// The screening and the fits see these, but for spikes of some sigmas that come one after the other.
+TEST(Bursts, AreNotSpikesOrReadingsThatAreStuck) {
+  Scenario scenario = scenario_in_eq1(4, std::chrono::hours(3));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.spike_probability = 1e-3;
+    gyro.readout.stuck_probability = 1e-4;
+  }
+  const auto rest = without_bursts(sim::simulate(scenario).pass);
+  EXPECT_LE(rest ? rest->bursts.bursts : 0, 2);
 }
 
 TEST(Bursts, OfManySamplesAreAnotherFault) {

@@ -153,7 +153,7 @@ struct ReadoutNoise {
   }
 };
 
-/// Readings by which the angle between two momenta was off for a moment, and which were left out.
+/// Readings by which the angle between two momenta was off for a moment.
 struct Bursts {
   long bursts = 0;
   long samples = 0;        ///< of all
@@ -258,7 +258,7 @@ struct NavigationRun {
   ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use
   double gyro_stamps_off_s = 0;               ///< rms off the regular times that the samples are of, or 0
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
-  std::optional<Bursts> bursts;               ///< readings that were left out
+  std::optional<Bursts> bursts;               ///< readings that are in the attitude
   std::vector<CorrelatedFixes> correlated_fixes;  ///< of the star trackers of which fixes were left out for it
   std::optional<Clocks> clocks;                   ///< where the pass shows them, behind this correction
   bool has_clock_state = false;                   ///< an offset of the star tracker's clock is estimated along
