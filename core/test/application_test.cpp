@@ -500,11 +500,10 @@ TEST(Hold, WhileTheCorrectionOfAnAdoptionIsUnderWayGivesItUp) {
   EXPECT_GT(done, 0);  // the navigator has been corrected, and the report of it was still to come
 }
 
-/// A case that has been moved: gyro 1 reads everything turned, from 1500 s on.
-std::vector<GyroSample> moved_at_1500_s() {
-  std::vector<GyroSample> samples = flight().samples;
+/// A case that has been moved: a gyro reads everything turned, from 1500 s on.
+std::vector<GyroSample> moved_at_1500_s(std::vector<GyroSample> samples = flight().samples, int gyro = 0) {
   for (std::size_t i = 8 * 1500; i < samples.size(); ++i) {
-    samples[i].h_b[0] = test::turn(0.002, -0.001, 0.002) * samples[i].h_b[0];
+    samples[i].h_b[gyro] = test::turn(0.002, -0.001, 0.002) * samples[i].h_b[gyro];
   }
   return samples;
 }
@@ -889,10 +888,8 @@ TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
 TEST(GyrosContradict, OfThreeUntilOneIsLeftOut) {
   constexpr double kTenTimesTheAngle_rad = 0.03;
   constexpr double kSigmas = 5;
-  auto samples = test::with_third_gyro(flight(), Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
-  for (std::size_t i = 8 * 1500; i < samples.size(); ++i) {
-    samples[i].h_b[2] = test::turn(0.002, -0.001, 0.002) * samples[i].h_b[2];
-  }
+  const auto samples =
+      moved_at_1500_s(test::with_third_gyro(flight(), Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1), 2);
   const auto application = test::started<TrioApplication>(test::nominal_parameters(3));
   fly_from(samples, flight().fixes, 0, 1500, *application);
   ASSERT_EQ(application->mode(), kNavigating);
@@ -949,14 +946,19 @@ TEST(GyrosContradict, NotAfterAGapBeforeTheNextFix) {
   EXPECT_EQ(application->faults(), 0U);
 }
 
-/// A star tracker that is off by 6′ for twenty minutes and more: followed in the end, but not believed.
-TEST(FixesContradict, UntilEnoughOfThemAgree) {
+std::vector<StarFix> tilted_from_1500_s() {
   std::vector<StarFix> fixes = flight().fixes;
   for (StarFix& fix : fixes) {
     if (fix.t >= Time(std::chrono::seconds(1500))) {
       fix.q_in_c = fix.q_in_c * Eigen::Quaterniond(test::turn(0.001, -0.001, 0.001));
     }
   }
+  return fixes;
+}
+
+/// A star tracker that is off by 6′ for twenty minutes and more: followed in the end, but not believed.
+TEST(FixesContradict, UntilEnoughOfThemAgree) {
+  const std::vector<StarFix> fixes = tilted_from_1500_s();
   const auto application = test::started<PairApplication>(test::nominal_parameters());
   fly_from(flight().samples, fixes, 0, 1500, *application);
   ASSERT_EQ(application->mode(), kNavigating);
@@ -975,12 +977,7 @@ TEST(FixesContradict, UntilEnoughOfThemAgree) {
 /// Gyros that are not used have no part in how far the fixes are off.
 TEST(FixesContradict, TheGyrosThatAreUsed) {
   const auto samples = test::with_third_gyro(flight(), Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
-  std::vector<StarFix> fixes = flight().fixes;
-  for (StarFix& fix : fixes) {
-    if (fix.t >= Time(std::chrono::seconds(1500))) {
-      fix.q_in_c = fix.q_in_c * Eigen::Quaterniond(test::turn(0.001, -0.001, 0.001));
-    }
-  }
+  const std::vector<StarFix> fixes = tilted_from_1500_s();
   for (const std::uint32_t selected : {0b011U, 0b110U}) {
     const auto application = test::started<TrioApplication>(test::nominal_parameters(3));
     fly_from(samples, fixes, 0, 100, *application);

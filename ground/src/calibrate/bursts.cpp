@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -269,72 +268,64 @@ std::vector<Burst> bursts_in(std::span<const double> angles_rad, double period_s
   return bursts;
 }
 
-/// Which gyros are wrong in each sample.
-struct Wrong {
-  std::vector<GyroMask> gyros;
-  Bursts found;
-};
+}  // namespace
 
-Wrong wrong_readings(const Pass& pass, const GyroReadings& readings) {
+std::optional<WrongReadings> wrong_for_a_moment(const Pass& pass) {
+  const GyroReadings readings(pass);
   const int gyros = readings.gyros();
+  if (gyros < 2 || pass.settings.gyro_period > kSlowestSamples) {
+    return std::nullopt;
+  }
   const double period_s = to_seconds(pass.settings.gyro_period);
   const auto told_rad = [&](int k) { return pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad; };
-  std::vector<std::array<int, kMaxGyros>> off(pass.gyro.size());  // angles of each gyro that are off
-  Wrong wrong{std::vector<GyroMask>(pass.gyro.size()), {}};
+  const std::vector<Span> spans = spans_without_gaps(pass.gyro.t, pass.settings.gyro_period);
+  std::vector<PerGyro<int>> angles_off(pass.gyro.size());  // of each gyro, to others
+  WrongReadings wrong{{}, std::vector<GyroMask>(pass.gyro.size())};
   for (int k = 0; k < gyros; ++k) {
     for (int j = k + 1; j < gyros; ++j) {
       const std::vector<double> angles_rad = angles_between(readings, k, j, period_s);
-      for (const Span& span : spans_without_gaps(pass.gyro.t, pass.settings.gyro_period)) {
+      for (const Span& span : spans) {
         const auto its = std::span(angles_rad).subspan(span.begin, span.size());
         for (const Burst& burst : bursts_in(its, period_s, std::hypot(told_rad(k), told_rad(j)))) {
           for (std::size_t i = span.begin + burst.samples.begin; i < span.begin + burst.samples.end; ++i) {
-            ++off[i][static_cast<std::size_t>(k)];
-            ++off[i][static_cast<std::size_t>(j)];
+            ++angles_off[i][k];
+            ++angles_off[i][j];
           }
-          wrong.found.largest_rad = std::max(wrong.found.largest_rad, burst.off_rad);
+          wrong.bursts.largest_rad = std::max(wrong.bursts.largest_rad, burst.off_rad);
         }
       }
     }
   }
   bool before = false;
-  for (std::size_t i = 0; i < off.size(); ++i) {
-    bool any = false;
+  for (std::size_t i = 0; i < angles_off.size(); ++i) {
     for (int k = 0; k < gyros; ++k) {
-      wrong.gyros[i][k] = off[i][static_cast<std::size_t>(k)] == gyros - 1;
-      any = any || wrong.gyros[i][k];
+      wrong.gyros[i][k] = angles_off[i][k] == gyros - 1;
     }
-    wrong.found.samples += any ? 1 : 0;
-    wrong.found.bursts += any && !before ? 1 : 0;
+    const bool any = count(wrong.gyros[i]) > 0;
+    wrong.bursts.samples += any ? 1 : 0;
+    wrong.bursts.bursts += any && !before ? 1 : 0;
     before = any;
   }
-  return wrong;
+  return wrong.bursts.samples > 0 ? std::optional(std::move(wrong)) : std::nullopt;
 }
 
-}  // namespace
-
-std::optional<WithoutBursts> without_bursts(const Pass& pass) {
-  constexpr long kOneIn = 20;
-  const GyroReadings readings(pass);
-  if (readings.gyros() < 2 || pass.settings.gyro_period > kSlowestSamples) {
+std::optional<Pass> without(const WrongReadings& wrong, const Pass& pass) {
+  constexpr long kTooMany = 20;  // one in so many
+  if (kTooMany * wrong.bursts.samples > std::ssize(pass.gyro.t)) {
     return std::nullopt;
   }
-  const Wrong wrong = wrong_readings(pass, readings);
-  if (wrong.found.samples == 0 || kOneIn * wrong.found.samples > std::ssize(pass.gyro.t)) {
-    return std::nullopt;
-  }
-  WithoutBursts rest{pass, wrong.found};
-  GyroTelemetry& kept = rest.pass.gyro;
-  kept.t.clear();
-  kept.h.clear();
+  Pass rest = pass;
+  rest.gyro.t.clear();
+  rest.gyro.h.clear();
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
-    if (readings.gyros() - count(wrong.gyros[i]) < 2) {
+    if (pass.gyro.gyros - count(wrong.gyros[i]) < 2) {
       continue;
     }
-    kept.t.push_back(pass.gyro.t[i]);
+    rest.gyro.t.push_back(pass.gyro.t[i]);
     for (int k = 0; k < pass.gyro.gyros; ++k) {
-      const Eigen::Vector3d h_b = k < kMaxGyros && wrong.gyros[i][k] ? Eigen::Vector3d(Eigen::Vector3d::Constant(kNaN))
-                                                                     : pass.gyro.direction(i, k);
-      kept.h.insert(kept.h.end(), h_b.begin(), h_b.end());
+      const bool is_wrong = k < kMaxGyros && wrong.gyros[i][k];
+      const Eigen::Vector3d h_b = is_wrong ? Eigen::Vector3d::Constant(kNaN).eval() : pass.gyro.direction(i, k);
+      rest.gyro.h.insert(rest.gyro.h.end(), h_b.begin(), h_b.end());
     }
   }
   return rest;

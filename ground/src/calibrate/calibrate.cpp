@@ -517,8 +517,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
   const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
   const Pass& with_bursts = with_regular ? *with_regular : as_given;
-  const std::optional<WithoutBursts> rest = finds_noise ? without_bursts(with_bursts) : std::nullopt;
-  const Pass& in_time = rest ? rest->pass : with_bursts;
+  const std::optional<WrongReadings> wrong = finds_noise ? wrong_for_a_moment(with_bursts) : std::nullopt;
+  const std::optional<Pass> rest = wrong ? without(*wrong, with_bursts) : std::nullopt;
+  const Pass& in_time = rest ? *rest : with_bursts;
   const std::optional<ReadoutNoise> noise = finds_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
@@ -564,8 +565,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   run.corrected_step = step;
   run.clock_correction = correction;
   run.readout_noise = noise;
-  if (rest) {
-    run.bursts = rest->bursts;
+  if (wrong) {
+    run.bursts = wrong->bursts;
+    run.bursts->left_out = rest.has_value();
   }
   run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
   add_to_estimates(correction, run.calibration.further);
@@ -622,8 +624,8 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   run.clock_correction = correction;
   run.readout_noise = noise;
   if (options.find_noise) {  // they stay: what follows them is not known yet where an attitude is given
-    if (const std::optional<WithoutBursts> rest = without_bursts(in_time)) {
-      run.bursts = rest->bursts;
+    if (const std::optional<WrongReadings> wrong = wrong_for_a_moment(in_time)) {
+      run.bursts = wrong->bursts;
     }
   }
   if (independent) {

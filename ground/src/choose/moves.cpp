@@ -38,7 +38,8 @@ constexpr double kTimesOfDecay[] = {0.05, 0.1, 0.2, 0.4};  // of the pass
 constexpr int kAll = -1;
 
 /// How far coefficients of eq. (1) may change, gyro by gyro, rad/s.
-VectorXd sigmas_of_coefficients(const PassSetup& setup, const Layout& members) {
+VectorXd sigmas_of_coefficients(const PassSetup& setup) {
+  const Layout members = setup.layout();
   VectorXd sigmas(Index{Layout::kEq1} * members.gyros);
   for (int k = 0; k < members.gyros; ++k) {
     const Index first = members.drift(k) - members.drift(0);
@@ -57,7 +58,7 @@ class ChangeSearch {
         found_(found),
         pass_(pass),
         gyros_(problem.layout().gyros),
-        coefficient_sigma_(sigmas_of_coefficients(problem.setup(), problem.setup().layout())) {}
+        coefficient_sigma_(sigmas_of_coefficients(problem.setup())) {}
 
   [[nodiscard]] const VectorXd& coefficient_sigma() const { return coefficient_sigma_; }
 

@@ -149,10 +149,11 @@ void TurnFit::add_drift(Time t, const Directions& h, const Matrix3d& trihedron, 
 }
 
 void TurnFit::add_drift_until(Time t, double clock_s, const PerGyro<Matrix3d>& align, DriftSum& sum) const {
-  constexpr double kStep_s = 5;  // in a slew of a degree a second the rule of the trapezoid is off by 0.1 % then
+  constexpr double kStep_s = 5;  // a slew of a degree a second turns by 5°: the rule of the trapezoid is off by 0.3 %
   const double span_s = sum.t ? to_seconds(t - *sum.t) : 0;
   const Time begin = t - from_seconds(span_s);
-  const int steps = span_s < 2 * lag_s_ ? static_cast<int>(std::ceil(span_s / kStep_s)) : 0;  // no turn is longer
+  const int steps =
+      span_s < 2 * lag_s_ ? static_cast<int>(std::ceil(span_s / kStep_s)) : 0;  // there is no turn over more
   for (int i = 1; i < steps; ++i) {
     const Time on_the_way = begin + from_seconds(span_s * i / steps);
     if (const auto h = readings_.near(on_the_way + from_seconds(clock_s))) {

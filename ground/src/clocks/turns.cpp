@@ -175,7 +175,7 @@ Matrix3d triad(const Vector3d& h1, const Vector3d& h2) {
 double rough_offset_s(const Pass& pass, const GyroReadings& readings, double finest_s) {
   constexpr std::size_t kMostTurns = 4000;
   constexpr double kClear = 8;
-  constexpr double kNoOther = 0.7;
+  constexpr double kNoOther = 0.7;  // of the cost; where the body turns evenly every lag is nearly as good
   constexpr double kApart_s = 30;
   const double period_s = std::max(to_seconds(pass.settings.star_tracker_period), finest_s);
   const double step_s =

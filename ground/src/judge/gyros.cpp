@@ -143,7 +143,7 @@ void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   }
 }
 
-void judge_bursts(const std::optional<Bursts>& bursts, bool left_out, std::vector<Finding>& findings) {
+void judge_bursts(const std::optional<Bursts>& bursts, std::vector<Finding>& findings) {
   if (!bursts) {
     return;
   }
@@ -151,15 +151,17 @@ void judge_bursts(const std::optional<Bursts>& bursts, bool left_out, std::vecto
       "For moments of up to some seconds the readings of a gyro were wrong: the angle between the momenta left its "
       "course and came back. ";
   add(findings, FindingCode::kGyroReadingsWrong,
-      what + (left_out ? "These samples were left out. Where the readings were off across that angle it does not show, "
-                         "and the attitude there is off with them."
-                       : "They are in the attitude: a navigation does not know yet that they come back."),
+      what + (bursts->left_out ? "These samples were left out. Where the readings were off across that angle it does "
+                                 "not show, and the attitude there is off with them."
+                               : "They are in the attitude."),
       fmt::format("{} times, {} samples; the angle was off by up to {}", bursts->bursts, bursts->samples,
                   angle_text(bursts->largest_rad)),
-      left_out ? "Look for what disturbs the readout: charging, saturation, telemetry that mixes packets."
-               : "Take the attitude of a calibration of this pass, which leaves them out, or leave them out of the "
-                 "telemetry.");
-  if (!left_out) {
+      bursts->left_out
+          ? "Look for what disturbs the readout: charging, saturation, telemetry that mixes packets."
+          : "Look for what disturbs the readout, and leave these parts out of the telemetry. A calibration "
+            "leaves them out where they are few; a navigation, which does not know yet that they come "
+            "back, does not.");
+  if (!bursts->left_out) {
     findings.back().severity = Severity::kDoNotUse;
   }
 }

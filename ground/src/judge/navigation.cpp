@@ -238,7 +238,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_gyros(pass, run.gyro_events, run.gyros, " Without it there is no pair at the end of the pass, and no attitude.",
               findings);
   judge_told_covariances(run.fixes, pass.settings.epoch, findings);
-  judge_bursts(run.bursts, false, findings);
+  judge_bursts(run.bursts, findings);
   judge_readout_noise(run.readout_noise, findings);
   judge_correlated_fixes(run.correlated_fixes, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);

@@ -75,7 +75,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
   judge_told_covariances(run.fixes, pass.settings.epoch, findings);
-  judge_bursts(run.bursts, true, findings);
+  judge_bursts(run.bursts, findings);
   judge_readout_noise(run.readout_noise, findings);
   judge_correlated_fixes(run.correlated_fixes, findings);
   judge_whiteness(pass, run, findings);

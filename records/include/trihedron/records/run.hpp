@@ -158,6 +158,7 @@ struct Bursts {
   long bursts = 0;
   long samples = 0;        ///< of all
   double largest_rad = 0;  ///< mean of the burst in which the angle was off most
+  bool left_out = false;   ///< else they are in the attitude
 };
 
 /// What a star tracker is off beside its outages, by the attitude without these fixes.
@@ -204,7 +205,7 @@ struct CalibrationRun {
   ClockCorrection clock_correction;                   ///< of the stamps, made before the calibration
   double gyro_stamps_off_s = 0;                       ///< rms off the regular times that were used in their place, or 0
   std::optional<ReadoutNoise> readout_noise;          ///< that was used in the place of that of the settings
-  std::optional<Bursts> bursts;                       ///< readings that were left out
+  std::optional<Bursts> bursts;
   std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
   std::vector<CorrelatedFixes> correlated_fixes;      ///< of the star trackers of which fixes were left out for it
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
@@ -258,7 +259,7 @@ struct NavigationRun {
   ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use
   double gyro_stamps_off_s = 0;               ///< rms off the regular times that the samples are of, or 0
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
-  std::optional<Bursts> bursts;               ///< readings that are in the attitude
+  std::optional<Bursts> bursts;               ///< all in the attitude
   std::vector<CorrelatedFixes> correlated_fixes;  ///< of the star trackers of which fixes were left out for it
   std::optional<Clocks> clocks;                   ///< where the pass shows them, behind this correction
   bool has_clock_state = false;                   ///< an offset of the star tracker's clock is estimated along
