@@ -199,12 +199,12 @@ struct FieldOrError {
 
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
-  CalibrationOptions options;                         ///< as decided
-  std::optional<Clocks> clocks;                       ///< where the pass shows them, by its stamps as they are given
-  std::optional<ClockStep> corrected_step;            ///< taken off the stamps before all else
-  ClockCorrection clock_correction;                   ///< of the stamps, made before the calibration
-  double gyro_stamps_off_s = 0;                       ///< rms off the regular times that were used in their place, or 0
-  std::optional<ReadoutNoise> readout_noise;          ///< that was used in the place of that of the settings
+  CalibrationOptions options;                 ///< as decided
+  std::optional<Clocks> clocks;               ///< where the pass shows them, by its stamps as they are given
+  std::optional<ClockStep> corrected_step;    ///< taken off the stamps before all else
+  ClockCorrection clock_correction;           ///< of the stamps, made before the calibration
+  double gyro_stamps_off_s = 0;               ///< rms off the regular times that were used in their place, or 0
+  std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
   std::optional<Bursts> bursts;
   std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
   std::vector<CorrelatedFixes> correlated_fixes;      ///< of the star trackers of which fixes were left out for it
