@@ -508,6 +508,15 @@ std::vector<GyroSample> moved_at_1500_s(std::vector<GyroSample> samples = flight
   return samples;
 }
 
+TEST(Adoption, IsJudgedByMisfitsOfTheOpenLoopOverTheirSigmas) {
+  Parameters table = test::nominal_parameters();
+  table.correction_interval_ns = Duration(std::chrono::hours(1)).count();
+  const auto application = test::started<PairApplication>(table);
+  fly_from(flight(), 0, 3500, *application);
+  EXPECT_EQ(application->mode(), kNavigating);
+  EXPECT_NEAR(application->housekeeping().navigation_ratio, 1, 0.5);  // of a hundred, which share the navigator's error
+}
+
 TEST(Adoption, IsTakenBackWhenResidualsDisagree) {
   const auto samples = moved_at_1500_s();
   const auto application = test::started<PairApplication>(test::nominal_parameters());
@@ -873,6 +882,7 @@ TEST(GyrosContradict, WithinASecondAndTheSigmasSaySo) {
     fly_from(samples, fixes, 1500, 1501, *application);
     EXPECT_TRUE(application->has(Fault::kGyrosContradict));
     EXPECT_EQ(application->mode(), kDegraded);
+    EXPECT_GT(application->attitude()->covariance_rad2.diagonal().minCoeff(), std::pow(kTenTimesTheAngle_rad / 2, 2));
     EXPECT_LT(largest_in_sigmas(samples, fixes, 1501, 1600, kTenTimesTheAngle_rad, *application), kSigmas);
     if (has_star_tracker) {  // twenty fixes are put down to it, and twenty more to the directions
       fly_from(samples, fixes, 1600, 1635, *application);
@@ -917,6 +927,18 @@ TEST(GyrosContradict, UntilTheNavigatorHasBeenCorrected) {
   }
   EXPECT_FALSE(application->has(Fault::kGyrosContradict));
   EXPECT_GT(application->on_board().corrected_t(), Time(std::chrono::seconds(1550)));
+}
+
+/// Readings that come back: the navigator has gone along with the wrong ones.
+TEST(GyrosContradict, UntilAFixWhereTheReadingsComeBack) {
+  std::vector<GyroSample> samples = moved_at_1500_s();
+  std::copy(flight().samples.begin() + 8 * 1510, flight().samples.end(), samples.begin() + 8 * 1510);
+  const auto application = test::started<PairApplication>(test::nominal_parameters());
+  fly_from(samples, flight().fixes, 0, 1500, *application);
+  fly_from(samples, kNoFixes, 1500, 1530, *application);
+  EXPECT_TRUE(application->has(Fault::kGyrosContradict));
+  fly_from(samples, flight().fixes, 1530, 1540, *application);
+  EXPECT_FALSE(application->has(Fault::kGyrosContradict));
 }
 
 /// Directions need not be of unit length to the last digit.
