@@ -137,10 +137,11 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
           layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
       second_order_.prediction_rad_s[k] = second_order_rad(alignment, drift) / time_since_fix_s_;
     }
-    // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
-    // (docs/mathematics.md, section 8).
+    // This error keeps its sign until the estimates change, so its sigma adds up, not its variance, and a random walk
+    // covers it with twice that sigma (docs/mathematics.md, section 8).
+    constexpr double kOfARamp = 2;
     const double before = second_order_rad_[k];
-    second_order_rad_[k] += second_order_.prediction_rad_s[k] * time_since_fix_s_;
+    second_order_rad_[k] += kOfARamp * second_order_.prediction_rad_s[k] * time_since_fix_s_;
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
                              second_order_rad_[k] * second_order_rad_[k] - before * before);
   }
@@ -184,8 +185,22 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
 }
 
 template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::drop_turns_about_momenta() {
+  for (int k = 0; k < layout().gyros; ++k) {
+    const Eigen::Vector3d& h_in = gyros_[k].h_in;
+    auto by_drift = since_fix_[k].by_drift.first(layout().drift_columns());
+    for (int i = 0; i < by_drift.cols(); ++i) {
+      const double along = h_in.dot(by_drift.col(i));
+      by_drift.col(i) -= along * h_in;
+    }
+  }
+}
+
+template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& readings) {
   const Eigen::Matrix3d& C_in_c = its.C_in_c.raw();
+  start_rad_ = its.C_in_c.log().raw().template cast<float>();
+  has_turned_ = false;
   // φ_k = C (δ_k − e) + readout: the momentum is read through the alignment at the fix, whose error e is common.
   constexpr int kMaxRows = 3 * kCapacity.gyros;
   const Layout& layout = setup_.layout;
@@ -634,6 +649,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       begin(correction, fix, readings, report);
       break;
     case Stage::kSecondOrder:
+      drop_turns_about_momenta();
       look_at_second_order(readings);
       correction.prediction_noise_rad =
           prediction_noise(correction.reopened ? correction.C_linear : rotation_now(readings));
@@ -671,7 +687,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       update(correction, seen(fix, readings), fix, readings, report);
       break;
     case Stage::kFeedback:
-      feed_back();
+      feed_back(correction.C_linear);
       correction.stage = Stage::kDone;
       break;
     default:
@@ -816,6 +832,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
     case Stage::kSecondOrder:
       // After angles an attitude has not been seen for long: nothing is held.
       second_order_.hold_s = 0;
+      drop_turns_about_momenta();
       look_at_second_order(readings);
       correction.prediction_noise_rad = prediction_noise(rotation_now(readings));
       correction.stage = Stage::kPropagation;
@@ -860,15 +877,37 @@ void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const F
   report.status = FixStatus::kUsed;
   angle_rejections_in_a_row_ = 0;
   information_.take(rows_of(white.rows));
-  feed_back();
+  feed_back(C_in_c);
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::feed_back() {
+Eigen::Vector3d InvariantEstimator<kCapacity>::turn_of_errors(const Eigen::Matrix3d& C_in_c,
+                                                              const Eigen::Vector3d& delta) {
+  if (!(delta.squaredNorm() > kSmallTurn_rad * kSmallTurn_rad)) {
+    return Eigen::Vector3d::Zero();
+  }
+  const Rot<In, C> start = Rot<In, C>::exp(Vec<In>::assume(start_rad_.cast<double>()));
+  const Eigen::Vector3d since_start = (start.inverse() * Rot<In, C>::assume(C_in_c)).log().raw();
+  const double angle2 = since_start.squaredNorm();
+  if (angle2 < kOneAttitude_rad * kOneAttitude_rad) {
+    return has_turned_ ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : delta;
+  }
+  has_turned_ = true;
+  return since_start.dot(delta) / angle2 * since_start;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::feed_back(const Eigen::Matrix3d& C_in_c) {
   const Vector x = information_.correction();
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];
+    const Eigen::Vector3d turn = turn_of_errors(C_in_c, x.template segment<3>(layout.alignment(k)));
+    if (turn.squaredNorm() > 0) {
+      const Eigen::Matrix3d turn_c = Rot<C, C>::exp(Vec<C>::assume(turn)).raw();
+      information_.turn(layout.alignment(k), turn_c);
+      information_.turn(layout.direction(k), C_in_c * turn_c * C_in_c.transpose());
+    }
     gyro.h_in = rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
