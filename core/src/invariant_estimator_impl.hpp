@@ -109,16 +109,17 @@ double InvariantEstimator<kCapacity>::second_order_rad(const Eigen::Matrix3d& A,
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::look_at_second_order(const FixReadings& readings) {
-  constexpr double kLonger = 1.5;
+  constexpr float kLonger = 1.5F;
   constexpr float kOtherwise = 0.5F;
   const Eigen::Vector3f rate_c = readings.rate_c.cast<float>();
-  second_order_.hold_s -= time_since_fix_s_;
+  const auto interval_s = static_cast<float>(time_since_fix_s_);
+  second_order_.hold_s -= interval_s;
   const bool holds = second_order_.hold_s > 0 && second_order_.hold_s <= kHoldSecondOrder_s &&
-                     time_since_fix_s_ <= kLonger * second_order_.interval_s &&
+                     interval_s <= kLonger * second_order_.interval_s &&
                      (rate_c - second_order_.rate_c).norm() < kOtherwise * second_order_.rate_c.norm();
   if (!holds) {
     second_order_.hold_s = 0;
-    second_order_.interval_s = time_since_fix_s_;
+    second_order_.interval_s = interval_s;
     second_order_.rate_c = rate_c;
   }
 }
@@ -185,22 +186,29 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::drop_turns_about_momenta() {
+void InvariantEstimator<kCapacity>::follow_alignments(const FixReadings& readings) {
   for (int k = 0; k < layout().gyros; ++k) {
-    const Eigen::Vector3d& h_in = gyros_[k].h_in;
-    auto by_drift = since_fix_[k].by_drift.first(layout().drift_columns());
-    for (int i = 0; i < by_drift.cols(); ++i) {
-      const double along = h_in.dot(by_drift.col(i));
-      by_drift.col(i) -= along * h_in;
+    if (!readings.used[k]) {
+      continue;
     }
+    const Gyro& gyro = gyros_[k];
+    auto& since = since_fix_[k];
+    auto by_drift = since.by_drift.first(layout().drift_columns());
+    for (int i = 0; i < by_drift.cols(); ++i) {
+      const double along = gyro.h_in.dot(by_drift.col(i));
+      by_drift.col(i) -= along * gyro.h_in;
+    }
+    // h_k · C_in_c δ_k has changed by what the reading has moved in c.
+    const Eigen::Vector3d moved_c = gyro.C_c_b * (readings.h_b[k] - h_b_at_fix_[k].template cast<double>());
+    const Eigen::Vector3d along = moved_c - since.by_alignment.transpose() * gyro.h_in;
+    since.by_alignment += gyro.h_in * along.transpose();
+    h_b_at_fix_[k] = readings.h_b[k].template cast<float>();
   }
 }
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& readings) {
   const Eigen::Matrix3d& C_in_c = its.C_in_c.raw();
-  start_rad_ = its.C_in_c.log().raw().template cast<float>();
-  has_turned_ = false;
   // φ_k = C (δ_k − e) + readout: the momentum is read through the alignment at the fix, whose error e is common.
   constexpr int kMaxRows = 3 * kCapacity.gyros;
   const Layout& layout = setup_.layout;
@@ -214,6 +222,7 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
     if (readings.used[k]) {
       gyros_[k].h_in = (C_in_c * gyros_[k].in_c(readings.h_b[k])).normalized();
     }
+    h_b_at_fix_[k] = readings.h_b[k].template cast<float>();
     H.template block<3, 3>(row, layout.direction(k)).setIdentity();
     H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
     H.block(row, layout.readout(k), 3, layout.readout_size()) =
@@ -325,7 +334,7 @@ PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Ma
     bool all_small = true;
     for (int k = 0; k < layout().gyros; ++k) {
       const double most =
-          std::max(second_order_.reading_rad[k], second_order_.prediction_rad_s[k] * kHoldSecondOrder_s);
+          std::max(second_order_.reading_rad[k], second_order_.prediction_rad_s[k] * static_cast<double>(kHoldSecondOrder_s));
       all_small = all_small && most < kSmallSecondOrder * noise_rad[k];
     }
     second_order_.hold_s = all_small ? kHoldSecondOrder_s : 0;
@@ -649,7 +658,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       begin(correction, fix, readings, report);
       break;
     case Stage::kSecondOrder:
-      drop_turns_about_momenta();
+      follow_alignments(readings);
       look_at_second_order(readings);
       correction.prediction_noise_rad =
           prediction_noise(correction.reopened ? correction.C_linear : rotation_now(readings));
@@ -687,7 +696,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       update(correction, seen(fix, readings), fix, readings, report);
       break;
     case Stage::kFeedback:
-      feed_back(correction.C_linear);
+      feed_back();
       correction.stage = Stage::kDone;
       break;
     default:
@@ -832,7 +841,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
     case Stage::kSecondOrder:
       // After angles an attitude has not been seen for long: nothing is held.
       second_order_.hold_s = 0;
-      drop_turns_about_momenta();
+      follow_alignments(readings);
       look_at_second_order(readings);
       correction.prediction_noise_rad = prediction_noise(rotation_now(readings));
       correction.stage = Stage::kPropagation;
@@ -877,37 +886,15 @@ void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const F
   report.status = FixStatus::kUsed;
   angle_rejections_in_a_row_ = 0;
   information_.take(rows_of(white.rows));
-  feed_back(C_in_c);
+  feed_back();
 }
 
 template <Capacity kCapacity>
-Eigen::Vector3d InvariantEstimator<kCapacity>::turn_of_errors(const Eigen::Matrix3d& C_in_c,
-                                                              const Eigen::Vector3d& delta) {
-  if (!(delta.squaredNorm() > kSmallTurn_rad * kSmallTurn_rad)) {
-    return Eigen::Vector3d::Zero();
-  }
-  const Rot<In, C> start = Rot<In, C>::exp(Vec<In>::assume(start_rad_.cast<double>()));
-  const Eigen::Vector3d since_start = (start.inverse() * Rot<In, C>::assume(C_in_c)).log().raw();
-  const double angle2 = since_start.squaredNorm();
-  if (angle2 < kOneAttitude_rad * kOneAttitude_rad) {
-    return has_turned_ ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : delta;
-  }
-  has_turned_ = true;
-  return since_start.dot(delta) / angle2 * since_start;
-}
-
-template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::feed_back(const Eigen::Matrix3d& C_in_c) {
+void InvariantEstimator<kCapacity>::feed_back() {
   const Vector x = information_.correction();
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];
-    const Eigen::Vector3d turn = turn_of_errors(C_in_c, x.template segment<3>(layout.alignment(k)));
-    if (turn.squaredNorm() > 0) {
-      const Eigen::Matrix3d turn_c = Rot<C, C>::exp(Vec<C>::assume(turn)).raw();
-      information_.turn(layout.alignment(k), turn_c);
-      information_.turn(layout.direction(k), C_in_c * turn_c * C_in_c.transpose());
-    }
     gyro.h_in = rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));

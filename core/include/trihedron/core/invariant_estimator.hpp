@@ -197,16 +197,12 @@ class InvariantEstimator {
   struct SecondOrder {
     PerGyro<double, kCapacity.gyros> prediction_rad_s{};  ///< 1-sigma per axis, of each second without a fix
     PerGyro<double, kCapacity.gyros> reading_rad{};       ///< 1-sigma per axis
-    double hold_s = 0;                                    ///< how long they still hold; zero: to be worked out
-    double interval_s = 0;                                ///< they stand for a fix so long after the one before,
-    Eigen::Vector3f rate_c{0, 0, 0};                      ///< and for this rate of the body, rad/s
+    // As floats the object of a pair stays within 32 KiB.
+    float hold_s = 0;                 ///< how long they still hold; zero: to be worked out
+    float interval_s = 0;             ///< they stand for a fix so long after the one before,
+    Eigen::Vector3f rate_c{0, 0, 0};  ///< and for this rate of the body, rad/s
   };
-  static constexpr double kHoldSecondOrder_s = 30;
-  /// Corrections of an alignment below this turn no errors: half an hour of them, all alike, is below an arcsecond times
-  /// what is known of it.
-  static constexpr double kSmallTurn_rad = 1e-7;
-  /// What the body may have turned since the start for all rows to have been about nearly the same attitude.
-  static constexpr double kOneAttitude_rad = 0.25;
+  static constexpr float kHoldSecondOrder_s = 30;
   static constexpr double kSmallSecondOrder = 0.1;  ///< of the noise of a reading
   /// A fix as it is compared.
   struct Seen {
@@ -289,14 +285,12 @@ class InvariantEstimator {
   /// Noise of the prediction since the last fix, the second-order term with it.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);
   void propagate(const PerGyro<double, kCapacity.gyros>& noise_rad);
-  /// Takes out of the sensitivities to drift what turns a momentum about itself. It moves nothing, but with the time it
-  /// becomes large, and where the estimate of the momentum is corrected it would turn it.
-  void drop_turns_about_momenta();
-  /// Corrects the estimate by the update that the information has taken. C_in_c: the attitude it was linearised at.
-  void feed_back(const Eigen::Matrix3d& C_in_c);
-  /// The part of a correction of an alignment by which the errors that all rows so far are about have turned alike, c
-  /// axes (docs/mathematics.md, section 8).
-  [[nodiscard]] Eigen::Vector3d turn_of_errors(const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& delta);
+  /// Has φ_k along h_k go on as C_in_c δ_k does, in the sensitivities since the last fix. Along a momentum an error moves
+  /// nothing and may be chosen; this choice keeps φ_k − C_in_c δ_k small in all three axes, so that what is known of it
+  /// across h_k stays true when the estimate of h_k moves (docs/mathematics.md, section 8).
+  void follow_alignments(const FixReadings& readings);
+  /// Corrects the estimate by the update that the information has taken.
+  void feed_back();
   /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
   [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
   /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.
@@ -325,9 +319,8 @@ class InvariantEstimator {
   double extra_variance_rad2_ = 0;
   int angles_since_fix_ = 0;
   int angle_rejections_in_a_row_ = 0;
-  Eigen::Vector3f start_rad_{0, 0, 0};     ///< rotation vector of the attitude at the start
-  bool has_turned_ = false;                ///< more than kOneAttitude_rad since
-  bool restarted_from_estimates_ = false;  ///< at the last restart
+  PerGyro<Eigen::Vector3f, kCapacity.gyros> h_b_at_fix_{};  ///< readings for which φ_k along h_k was chosen
+  bool restarted_from_estimates_ = false;                   ///< at the last restart
   bool started_ = false;
 };
 

@@ -181,16 +181,6 @@ class SquareRootInformation {
     return x;
   }
 
-  /// Three states one after another, x_t, are given about other axes from now on: x_t ← turn x_t.
-  void turn(int first, const Eigen::Matrix3d& turn) {
-    for (int i = 0; i < first + 3; ++i) {
-      double* row = root().row(i) + first;
-      const Eigen::Vector3d turned = turn * Eigen::Vector3d(row[0], row[1], row[2]);
-      std::copy_n(turned.data(), 3, row);
-    }
-    triangularise({root().row(first) + first, 3, states_ - first, states_ + 1}, 3);
-  }
-
   /// take(), and its correction().
   [[nodiscard]] Vector update(RowsView rows) {
     take(rows);
