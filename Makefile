@@ -10,7 +10,7 @@ DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly thorough docs shown \
-  format lint \
+  format lint alone \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
 help:
@@ -236,7 +236,7 @@ fuzz: fuzz-build
 fuzz-briefly: fuzz-build
 	nice -n 5 $(FUZZ) --briefly
 
-thorough: everything lint sanitize coverage interop fuzz-briefly
+thorough: everything lint alone sanitize coverage interop fuzz-briefly
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS) -L thorough
 
 # Fails on each warning, but those that docs/reference.sh lets pass, and on each broken link.
@@ -258,6 +258,12 @@ shown: build
 
 format: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)
+
+# Each source by itself: packages group them otherwise into units, in which one may live on what another has included.
+alone:
+	@cmake/setup.sh program
+	cmake --preset lint -B build-alone -DCMAKE_UNITY_BUILD=OFF
+	cmake/alone.py build-alone --jobs $(JOBS)
 
 # Of one version everywhere. That clang-tidy of Debian 12 runs each check over all that the headers of others contain.
 $(LINT_TOOLS)/installed: cmake/lint-requirements.txt

@@ -139,8 +139,8 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
       second_order_.prediction_rad_s[k] = second_order_rad(alignment, drift) / time_since_fix_s_;
     }
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance, and a random walk
-    // covers it with twice that sigma (docs/mathematics.md, section 8).
-    constexpr double kOfARamp = 2;
+    // needs more than the same sigma to cover it (docs/mathematics.md, section 8).
+    constexpr double kOfARamp = 1.5;
     const double before = second_order_rad_[k];
     second_order_rad_[k] += kOfARamp * second_order_.prediction_rad_s[k] * time_since_fix_s_;
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
@@ -198,11 +198,13 @@ void InvariantEstimator<kCapacity>::follow_alignments(const FixReadings& reading
       const double along = gyro.h_in.dot(by_drift.col(i));
       by_drift.col(i) -= along * gyro.h_in;
     }
-    // h_k · C_in_c δ_k has changed by what the reading has moved in c.
-    const Eigen::Vector3d moved_c = gyro.C_c_b * (readings.h_b[k] - h_b_at_fix_[k].template cast<double>());
+    // h_k · C_in_c δ_k has changed by what the reading has moved in c. The changes add up to that since the start, to the
+    // rounding of one.
+    const Eigen::Vector3f h_b = readings.h_b[k].template cast<float>();
+    const Eigen::Vector3d moved_c = gyro.C_c_b * (h_b - h_b_at_fix_[k]).template cast<double>();
     const Eigen::Vector3d along = moved_c - since.by_alignment.transpose() * gyro.h_in;
     since.by_alignment += gyro.h_in * along.transpose();
-    h_b_at_fix_[k] = readings.h_b[k].template cast<float>();
+    h_b_at_fix_[k] = h_b;
   }
 }
 

@@ -31,11 +31,11 @@ double normalised_square(const Eigen::VectorXd& error, const Eigen::MatrixXd& co
   return scaled.dot(correlation.llt().solve(scaled));
 }
 
-Eigen::Matrix3d Flight::attitude(double t_s, double slews_rad, double steady_until_s) {
+Eigen::Matrix3d Flight::attitude(double t_s, double slews_rad, double steady_until_s, double turn_rad_s) {
   const double slewing_s = std::max(t_s - steady_until_s, 0.0);
   const double roll = slews_rad * std::sin(slewing_s / 97);
   const double pitch = slews_rad / 3 * std::sin(slewing_s / 151);
-  return turn(0.3, -0.2, 0.9) * turn(0, 1.1e-3 * t_s, 0) * turn(roll, 0, 0) * turn(0, pitch, 0);
+  return turn(0.3, -0.2, 0.9) * turn(0, turn_rad_s * t_s, 0) * turn(roll, 0, 0) * turn(0, pitch, 0);
 }
 
 Flight::Flight(const FlightPlan& plan) {
@@ -50,6 +50,9 @@ Flight::Flight(const FlightPlan& plan) {
   std::normal_distribution<double> normal;
   const auto white = [&] { return test::white(random, normal); };
 
+  const auto attitude_at = [&](double t_s) {
+    return attitude(t_s, plan.slews_rad, plan.steady_until_s, plan.turn_rad_s);
+  };
   constexpr double kPeriod_s = 0.125;
   const int count = static_cast<int>(plan.duration_s / kPeriod_s);
   double next_fix_s = plan.fix_offset_s;
@@ -57,7 +60,7 @@ Flight::Flight(const FlightPlan& plan) {
   std::uniform_real_distribution<double> even;
   for (int i = 0; i <= count; ++i) {
     const double t_s = i * kPeriod_s;
-    const Eigen::Matrix3d C_in_c = attitude(t_s, plan.slews_rad, plan.steady_until_s);
+    const Eigen::Matrix3d C_in_c = attitude_at(t_s);
     GyroSample sample;
     sample.t = Time(from_seconds(t_s));
     for (int k = 0; k < 2; ++k) {
@@ -68,7 +71,7 @@ Flight::Flight(const FlightPlan& plan) {
     C_in_c_at_samples.push_back(C_in_c);
     for (; next_fix_s < t_s + kPeriod_s && next_fix_s <= plan.duration_s;) {
       const Eigen::Vector3d error = plan.noise * kTracker_rad.cwiseProduct(white());
-      const Eigen::Matrix3d measured = attitude(next_fix_s, plan.slews_rad, plan.steady_until_s) * turn(error);
+      const Eigen::Matrix3d measured = attitude_at(next_fix_s) * turn(error);
       fixes.push_back({Time(from_seconds(next_fix_s)), Eigen::Quaterniond(measured)});
       next_fix_s += plan.fix_interval_s - plan.fix_jitter_s * even(intervals);
     }
@@ -76,7 +79,7 @@ Flight::Flight(const FlightPlan& plan) {
       break;
     }
     for (int k = 0; k < 2; ++k) {
-      const Eigen::Matrix3d middle = attitude(t_s + kPeriod_s / 2, plan.slews_rad, plan.steady_until_s);
+      const Eigen::Matrix3d middle = attitude_at(t_s + kPeriod_s / 2);
       precess(truth[k], eq1, middle, Eigen::Vector3d(truth[k].C_c_b.transpose() * middle.transpose() * truth[k].h_in),
               {}, kPeriod_s);
     }

@@ -26,6 +26,7 @@ struct FlightPlan {
   double duration_s = 1800;
   double slews_rad = 0.5;  ///< amplitude of rolls; a third of it in pitch
   double steady_until_s = 0;
+  double turn_rad_s = 1.1e-3;  ///< of the body, in an orbit
   double misalignment = 1;  ///< times 30′
   double noise = 1;         ///< of the nominal noise
   unsigned seed = 1;
@@ -45,7 +46,8 @@ struct Flight {
 
   explicit Flight(const FlightPlan& plan);
 
-  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad, double steady_until_s = 0);
+  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad, double steady_until_s = 0,
+                                                double turn_rad_s = 1.1e-3);
 };
 
 /// Samples of a pair, and a third gyro's in a case without misalignment, whose rotor does not drift from `h_in`.

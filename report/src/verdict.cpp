@@ -65,8 +65,8 @@ json verdict_of(const Verdict& verdict) {
     result["style"] = "good";
     result["word"] = "Trustworthy";
     result["lead"] =
-        "The result can be used as it is: the telemetry agrees with the model, and the fixes scatter as much as the "
-        "noise figures say.";
+        "The result can be used as it is: what was found in the telemetry is in the calibration, and the fixes scatter "
+        "as much as the noise figures say.";
   }
   return result;
 }

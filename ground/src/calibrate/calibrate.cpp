@@ -411,21 +411,28 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   return run;
 }
 
+struct Restamped {
+  Pass pass;
+  double late_s = 0;  ///< what all stamps of the gyros were taken to be late, beside their scatter
+};
+
 /// With regular stamps of the gyros. What stamps that scatter are off in the mean they do not tell, but those of the
-/// star tracker do, up to about as much as they scatter.
-Pass with_stamps(Pass pass, const RegularStamps& regular) {
+/// star tracker do, up to about as much as they scatter: the mean of a delay is √3 of its scatter where it is even, and
+/// as large as it where it is exponential.
+Restamped with_stamps(const Pass& pass, const RegularStamps& regular) {
   constexpr double kSure = 5;
-  constexpr double kLikeScatter = 3;
-  pass.gyro.t = regular.t;
-  const std::optional<Clocks> clocks = clocks_of(pass);
-  if (!clocks || !clocks->mid_offset_s.is_sure(kSure) ||
-      std::abs(clocks->mid_offset_s.value) > kLikeScatter * regular.scatter_s) {
-    return pass;
+  constexpr double kLikeScatter = 2;
+  Restamped result{pass};
+  result.pass.gyro.t = regular.t;
+  const std::optional<Clocks> clocks = clocks_of(result.pass);
+  if (clocks && clocks->mid_offset_s.is_sure(kSure) &&
+      std::abs(clocks->mid_offset_s.value) < kLikeScatter * regular.scatter_s) {
+    result.late_s = clocks->mid_offset_s.value;
+    for (Time& t : result.pass.gyro.t) {
+      t -= from_seconds(result.late_s);
+    }
   }
-  for (Time& t : pass.gyro.t) {
-    t -= from_seconds(clocks->mid_offset_s.value);
-  }
-  return pass;
+  return result;
 }
 
 /// How much later after their stamps the fixes of further star trackers hold the attitude than those of the first.
@@ -514,9 +521,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
                                std::optional<Calibration> known_before) {
   begin_stage(progress, "looks at the clocks");
   const std::optional<RegularStamps> regular = regular_stamps(as_given);
-  const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
+  const std::optional<Restamped> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
   const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
-  const Pass& with_bursts = with_regular ? *with_regular : as_given;
+  const Pass& with_bursts = with_regular ? with_regular->pass : as_given;
   const std::optional<WrongReadings> wrong = finds_noise ? wrong_for_a_moment(with_bursts) : std::nullopt;
   const std::optional<Pass> rest = wrong ? without(*wrong, with_bursts) : std::nullopt;
   const Pass& in_time = rest ? *rest : with_bursts;
@@ -570,6 +577,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
     run.bursts->left_out = rest.has_value();
   }
   run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
+  run.gyro_stamps_late_s = with_regular ? with_regular->late_s : 0;
   add_to_estimates(correction, run.calibration.further);
   run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
   if (known_before) {

@@ -12,6 +12,7 @@
 #include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
+#include "model/setup.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {

@@ -12,6 +12,8 @@
 namespace trihedron::ground {
 namespace {
 
+using Choice = FurtherStateOptions::Choice;
+
 /// ln of the odds of the polhodes of all rotors together from which on they are tried.
 constexpr double kLogOddsOfPolhode = 10;
 

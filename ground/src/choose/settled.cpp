@@ -7,6 +7,7 @@
 
 #include "choose/open_choices.hpp"
 #include "model/drift_on_board.hpp"
+#include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {

@@ -17,6 +17,7 @@
 #include "trihedron/core/readings.hpp"
 #include "trihedron/core/setup.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
+#include "trihedron/records/text.hpp"
 #include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {

@@ -732,6 +732,9 @@ TEST(Verdict, FindsStampsOfGyrosThatScatter) {
   EXPECT_THAT(codes(verdict), ElementsAre("gyro-stamps-scatter"));
   EXPECT_EQ(verdict.findings[0].evidence, "17.0 ms (root mean square)");
   EXPECT_TRUE(verdict.trustworthy);
+  run.gyro_stamps_late_s = 0.03;
+  EXPECT_EQ(judge(good_pass(), run).findings[0].evidence,
+            "17.0 ms (root mean square); beside this all were taken to be +30.0 ms late, as the star tracker says");
 }
 
 TEST(Verdict, ForbidsAPairOfWhichNoClockAgreesWithAnother) {

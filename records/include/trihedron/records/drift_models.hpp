@@ -26,20 +26,20 @@ inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree)
 /// In settings in place of a name: the model that the pass gives evidence of.
 inline constexpr std::string_view kAutoDriftModel = "auto";
 
-/// In settings in place of a name: the largest model, the members outside eq. (1) with variances that the pass
-/// determines. Of estimator batch.
+/// In settings in place of a name: the drift field, all members of the largest model, those outside eq. (1) with
+/// prior variances that the pass determines. May be asked for with estimator batch only.
 inline constexpr std::string_view kDriftField = "field";
 
 /// "esg7", "vsh:2"
 [[nodiscard]] std::string name_of(const DriftModelId& model);
 /// Nothing for another name, or a degree that there is not.
 [[nodiscard]] std::optional<DriftModelId> drift_model_named(std::string_view name);
-/// Of each model.
+/// The names of all drift models.
 [[nodiscard]] std::vector<std::string> drift_model_names();
-/// For messages: "esg7, esg20, or vsh:1 … vsh:6"
+/// For messages: "esg7, esg20, or vsh:1 … vsh:8"
 [[nodiscard]] std::string drift_model_choices();
 
-/// In the model's order, that of `drift_rad_s` in GyroCalibration; those of eq. (1) come first.
+/// The coefficients of a model in the order of `drift_rad_s` in GyroCalibration; those of eq. (1) come first.
 [[nodiscard]] std::vector<DriftCoefficient> coefficients_of(const DriftModelId& model);
 
 /// "k0", "W(1,-1)"

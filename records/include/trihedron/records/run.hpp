@@ -204,6 +204,7 @@ struct CalibrationRun {
   std::optional<ClockStep> corrected_step;    ///< taken off the stamps before all else
   ClockCorrection clock_correction;           ///< of the stamps, made before the calibration
   double gyro_stamps_off_s = 0;               ///< rms off the regular times that were used in their place, or 0
+  double gyro_stamps_late_s = 0;              ///< in the mean, by the star tracker; taken off those that scatter
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
   std::optional<Bursts> bursts;
   std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
