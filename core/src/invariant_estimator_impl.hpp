@@ -140,7 +140,7 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
     }
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance, and a random walk
     // needs more than the same sigma to cover it (docs/mathematics.md, section 8).
-    constexpr double kOfARamp = 1.5;
+    constexpr double kOfARamp = 1.4;
     const double before = second_order_rad_[k];
     second_order_rad_[k] += kOfARamp * second_order_.prediction_rad_s[k] * time_since_fix_s_;
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
