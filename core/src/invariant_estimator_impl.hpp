@@ -198,8 +198,8 @@ void InvariantEstimator<kCapacity>::follow_alignments(const FixReadings& reading
       const double along = gyro.h_in.dot(by_drift.col(i));
       by_drift.col(i) -= along * gyro.h_in;
     }
-    // h_k · C_in_c δ_k has changed by what the reading has moved in c. The changes add up to that since the start, to the
-    // rounding of one.
+    // h_k · C_in_c δ_k has changed by what the reading has moved in c. The changes add up to that since the start, to
+    // the rounding of one.
     const Eigen::Vector3f h_b = readings.h_b[k].template cast<float>();
     const Eigen::Vector3d moved_c = gyro.C_c_b * (h_b - h_b_at_fix_[k]).template cast<double>();
     const Eigen::Vector3d along = moved_c - since.by_alignment.transpose() * gyro.h_in;
@@ -335,8 +335,8 @@ PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Ma
     second_order_.reading_rad = second_order_of_reading(C_linear);
     bool all_small = true;
     for (int k = 0; k < layout().gyros; ++k) {
-      const double most =
-          std::max(second_order_.reading_rad[k], second_order_.prediction_rad_s[k] * static_cast<double>(kHoldSecondOrder_s));
+      const double most = std::max(second_order_.reading_rad[k],
+                                   second_order_.prediction_rad_s[k] * static_cast<double>(kHoldSecondOrder_s));
       all_small = all_small && most < kSmallSecondOrder * noise_rad[k];
     }
     second_order_.hold_s = all_small ? kHoldSecondOrder_s : 0;

@@ -27,8 +27,8 @@ struct FlightPlan {
   double slews_rad = 0.5;  ///< amplitude of rolls; a third of it in pitch
   double steady_until_s = 0;
   double turn_rad_s = 1.1e-3;  ///< of the body, in an orbit
-  double misalignment = 1;  ///< times 30′
-  double noise = 1;         ///< of the nominal noise
+  double misalignment = 1;     ///< times 30′
+  double noise = 1;            ///< of the nominal noise
   unsigned seed = 1;
   double fix_offset_s = 0;    ///< of the first fix
   double fix_interval_s = 3;  ///< from each to the next

@@ -197,9 +197,10 @@ void judge_gyro_stamps(double off_s, double late_s, Finding::Severity severity, 
         fmt::format("The stamps of the gyro samples scatter about regular times, at which the readings were taken{}.",
                     what_then),
         fmt::format("{:.1f} ms (root mean square){}", 1e3 * off_s,
-                    late_s == 0 ? std::string()
-                                : fmt::format("; beside this all were taken to be {:+.1f} ms late, as the star tracker says",
-                                              1e3 * late_s)),
+                    late_s == 0
+                        ? std::string()
+                        : fmt::format("; beside this all were taken to be {:+.1f} ms late, as the star tracker says",
+                                      1e3 * late_s)),
         "Stamp the samples when they are taken, not when they are sent or received.");
   }
 }
@@ -247,8 +248,7 @@ double turned_in_sigmas(const AttitudeHistory& attitude, double time_s) {
 
 void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   judge_gyro_stamps(run.gyro_stamps_off_s, run.gyro_stamps_late_s, Finding::Severity::kWarning,
-                    "; the calibration has used these times",
-                    findings);
+                    "; the calibration has used these times", findings);
   const ClockCorrection& correction = run.clock_correction;
   const bool corrected = correction.of_star_tracker();
   double offset_s = sure_value_of(run, FurtherState::kClockOffset);
@@ -315,7 +315,8 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
   const bool corrected = run.clock_correction.of_star_tracker() || run.clock_correction.of_gyros();
   tell_correction(pass.settings, run.clock_correction, findings);
   const bool too_scattered = run.gyro_stamps_off_s > kTooScattered_s;
-  judge_gyro_stamps(run.gyro_stamps_off_s, 0, too_scattered ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+  judge_gyro_stamps(run.gyro_stamps_off_s, 0,
+                    too_scattered ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
                     ", which is in the attitude", findings);
   if (!run.clocks) {
     return;
