@@ -224,7 +224,7 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
     if (readings.used[k]) {
       gyros_[k].h_in = (C_in_c * gyros_[k].in_c(readings.h_b[k])).normalized();
     }
-    h_b_at_fix_[k] = readings.h_b[k].template cast<float>();
+    h_b_at_fix_[k] = gyros_[k].reading_of(C_in_c.transpose() * gyros_[k].h_in).template cast<float>();
     H.template block<3, 3>(row, layout.direction(k)).setIdentity();
     H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
     H.block(row, layout.readout(k), 3, layout.readout_size()) =
