@@ -291,7 +291,7 @@ TEST(InvariantEstimator, IsConsistentFromTwoDegrees) {
   EXPECT_NEAR(mean.nees, 20, nees_band(40));
 }
 
-// Of the third order there is a little at five degrees: 22.5 over eighty flights.
+// At five degrees what is of the third order shows: the band is about what flights have, not about 20.
 TEST(InvariantEstimator, IsNearlyConsistentFromFiveDegrees) {
   const MeanOutcome mean = fly_many(20, 0.087, {.duration_s = 1800});
   EXPECT_NEAR(mean.nees, 22.5, nees_band(20));

@@ -285,8 +285,8 @@ class InvariantEstimator {
   /// Noise of the prediction since the last fix, the second-order term with it.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);
   void propagate(const PerGyro<double, kCapacity.gyros>& noise_rad);
-  /// Has φ_k along h_k go on as C_in_c δ_k does, in the sensitivities since the last fix. Along a momentum an error
-  /// moves nothing and may be chosen; this choice keeps φ_k − C_in_c δ_k small in all three axes, so that what is known
+  /// Makes φ_k along h_k follow C_in_c δ_k, in the sensitivities since the last fix. Along a momentum an error moves
+  /// nothing and may be chosen; this choice keeps φ_k − C_in_c δ_k small in all three axes, so that what is known
   /// of it across h_k stays true when the estimate of h_k moves (docs/mathematics.md, section 8).
   void follow_alignments(const FixReadings& readings);
   /// Corrects the estimate by the update that the information has taken.
