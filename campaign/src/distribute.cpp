@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <deque>
 #include <map>
 #include <stdexcept>
@@ -29,8 +31,7 @@ class Assignments {
           idle_.push_back(event.worker);
           break;
         case WorkerEvent::Kind::kPerformed:
-          expect(event);
-          idle_.push_back(event.worker);
+          take(event);
           records.push_back(std::move(event.record));
           break;
         case WorkerEvent::Kind::kEnded:
@@ -44,12 +45,15 @@ class Assignments {
   }
 
  private:
-  void expect(const WorkerEvent& event) {
+  void take(const WorkerEvent& event) {
     const auto its = performed_by_.find(event.worker);
-    if (its == performed_by_.end() || its->second != event.record.run) {
+    if (its == performed_by_.end() || std::erase(its->second, event.record.run) == 0) {
       throw std::logic_error(fmt::format("a worker gives run {}, which it was not to perform", event.record.run));
     }
-    performed_by_.erase(its);
+    if (its->second.empty()) {
+      performed_by_.erase(its);
+      idle_.push_back(event.worker);
+    }
   }
 
   void lose(const WorkerEvent& event, std::vector<RunRecord>& records) {
@@ -58,32 +62,42 @@ class Assignments {
     if (its == performed_by_.end()) {
       return;
     }
-    const std::uint64_t run = its->second;
-    performed_by_.erase(its);
-    if (++lost_[run] < kProcessesForARun) {
-      waiting_.push_front(run);
-    } else {
-      records.push_back(
-          failed(plan_, run, fmt::format("ended its process {} times, at last by {}", lost_[run], event.reason)));
+    for (const std::uint64_t run : its->second) {
+      if (++lost_[run] < kProcessesForARun) {
+        again_.push_back(run);
+      } else {
+        records.push_back(
+            failed(plan_, run, fmt::format("ended its process {} times, at last by {}", lost_[run], event.reason)));
+      }
     }
+    performed_by_.erase(its);
+  }
+
+  /// Those that a worker performs next. One that has ended a process, perhaps by itself, goes alone.
+  std::vector<std::uint64_t> next_runs() {
+    std::deque<std::uint64_t>& from = again_.empty() ? waiting_ : again_;
+    const std::size_t size = again_.empty() ? std::min(runs_together(plan_), waiting_.size()) : 1;
+    const auto end = from.begin() + static_cast<std::ptrdiff_t>(size);
+    std::vector<std::uint64_t> runs(from.begin(), end);
+    from.erase(from.begin(), end);
+    return runs;
   }
 
   void give() {
-    while (!idle_.empty() && !waiting_.empty()) {
+    while (!idle_.empty() && !(waiting_.empty() && again_.empty())) {
       const std::uint64_t worker = idle_.front();
-      const std::uint64_t run = waiting_.front();
       idle_.pop_front();
-      waiting_.pop_front();
-      performed_by_[worker] = run;
-      workers_.give(worker, run);
+      const std::vector<std::uint64_t>& runs = performed_by_[worker] = next_runs();
+      workers_.give(worker, runs);
     }
   }
 
   const CampaignPlan& plan_;
   Workers& workers_;
   std::deque<std::uint64_t> waiting_;
+  std::deque<std::uint64_t> again_;  ///< those whose worker has ended
   std::deque<std::uint64_t> idle_;
-  std::map<std::uint64_t, std::uint64_t> performed_by_;  ///< runs, by their workers
+  std::map<std::uint64_t, std::vector<std::uint64_t>> performed_by_;  ///< runs, by their workers
   std::map<std::uint64_t, int> lost_;                    ///< processes that a run has ended
   std::size_t left_;
 };

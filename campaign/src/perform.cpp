@@ -7,15 +7,18 @@
 #include <limits>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
+#include "trihedron/lanes/filter_flight.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::campaign {
@@ -223,6 +226,50 @@ RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
   return record;
 }
 
+namespace {
+
+/// What fly_filters() makes of a flight.
+RunRecord record_of(const lanes::FilterResult& result, const CampaignPlan& plan) {
+  const auto gyros = static_cast<Eigen::Index>(plan.gyros);
+  constexpr auto kCoefficients = static_cast<Eigen::Index>(kCampaignCoefficients);
+  constexpr auto kParameters = static_cast<Eigen::Index>(kCampaignParameters);
+  RunRecord record;
+  record.outcome = result.reopened == 0 ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
+  if (result.reopened > 0) {
+    record.findings.emplace_back(name_of(FindingCode::kReopened));
+  }
+  record.drift_model = name_of(result.drift_model);
+  const Eigen::VectorXd sigma = result.covariance.diagonal().cwiseSqrt();
+  const auto put = [&](RunQuantity quantity, const Eigen::VectorXd& of, Eigen::Index first, Eigen::Index size) {
+    for (Eigen::Index k = 0; k < gyros; ++k) {
+      const Eigen::VectorXd its = of.segment(k * kParameters + first, size);
+      record[quantity].insert(record[quantity].end(), its.begin(), its.end());
+    }
+  };
+  put(RunQuantity::kDriftError, result.error, 0, kCoefficients);
+  put(RunQuantity::kDriftSigma, sigma, 0, kCoefficients);
+  put(RunQuantity::kAlignmentError, result.error, kCoefficients, kParameters - kCoefficients);
+  put(RunQuantity::kAlignmentSigma, sigma, kCoefficients, kParameters - kCoefficients);
+  if (plan.keeps_covariance) {
+    record[RunQuantity::kCovariance].assign(result.covariance.data(),
+                                            result.covariance.data() + result.covariance.size());
+  }
+  const auto mean = [](double sum, std::size_t count) { return count > 0 ? sum / static_cast<double>(count) : kNone; };
+  record[RunQuantity::kNees] = {ground::normalised_square(result.error, result.covariance)};
+  record[RunQuantity::kNeesFreedom] = {static_cast<double>(result.error.size())};
+  record[RunQuantity::kNisMean] = {mean(result.nis_sum, result.fixes_used)};
+  record[RunQuantity::kNisFreedom] = {2.0 * static_cast<double>(gyros)};
+  record[RunQuantity::kNisFixes] = {static_cast<double>(result.fixes_used)};
+  record[RunQuantity::kNisMeanOfAll] = {mean(result.nis_sum_of_judged, result.fixes_judged)};
+  record[RunQuantity::kNisFixesOfAll] = {static_cast<double>(result.fixes_judged)};
+  record[RunQuantity::kAttitudeRms] = {result.attitude_rms_rad.x(), result.attitude_rms_rad.y(),
+                                       result.attitude_rms_rad.z()};
+  record[RunQuantity::kAttitudeNormalisedSquare] = {result.attitude_normalised_square};
+  return record;
+}
+
+}  // namespace
+
 RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason) {
   RunRecord record;
   record.run = run;
@@ -237,53 +284,146 @@ RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason
   return record;
 }
 
+namespace {
+
+/// When runs were begun, by the clock and of the processor of this thread.
+class Begun {
+ public:
+  /// Puts what has passed since into records, each an equal part of it.
+  void tell(std::span<RunRecord> records) const {
+    const auto count = static_cast<double>(records.size());
+    for (RunRecord& record : records) {
+      record.cpu_s = (thread_cpu_s() - cpu_s_) / count;
+      record.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - at_).count() / count;
+    }
+  }
+
+ private:
+  std::chrono::steady_clock::time_point at_ = std::chrono::steady_clock::now();
+  double cpu_s_ = thread_cpu_s();
+};
+
+/// The record that `work` gives, or that of a run that has failed.
+template <class Work>
+RunRecord unless_it_fails(const CampaignPlan& plan, std::uint64_t run, const Work& work) {
+  try {
+    return work();
+  } catch (const Stopped&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;  // it says nothing of the run
+  } catch (const ground::SetupError& error) {
+    return failed(plan, run, std::string(error.what()) + "; " + error.cure());
+  } catch (const std::exception& error) {
+    return failed(plan, run, error.what());
+  }
+}
+
+/// That of a run, or the record of one whose draws make none.
+std::variant<RunSetup, RunRecord> setup_or_failure(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of) {
+  try {
+    return setup_of(seed_of_run(plan, run), draws_of_run(plan, run));
+  } catch (const std::invalid_argument& error) {
+    return failed(plan, run, error.what());
+  }
+}
+
+void name(const CampaignPlan& plan, std::uint64_t run, RunRecord& record) {
+  record.run = run;
+  record.seed = seed_of_run(plan, run);
+  record.draws = draws_of_run(plan, run);
+}
+
+std::vector<RunRecord> fly_filters(const CampaignPlan& plan, std::span<const std::uint64_t> runs,
+                                   const SetupOf& setup_of) {
+  std::vector<std::optional<RunRecord>> records(runs.size());
+  std::vector<lanes::FilterFlight> flights;
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    std::variant<RunSetup, RunRecord> setup = setup_or_failure(plan, runs[i], setup_of);
+    if (auto* const failure = std::get_if<RunRecord>(&setup)) {
+      records[i] = std::move(*failure);
+    } else {
+      RunSetup& its = std::get<RunSetup>(setup);
+      flights.push_back({std::move(its.scenario), std::move(its.options)});
+      places.push_back(i);
+    }
+  }
+  const std::vector<lanes::FilterOutcome> outcomes = lanes::fly(flights);
+  for (std::size_t i = 0; i < outcomes.size(); ++i) {
+    const auto* const failure = std::get_if<lanes::FilterFailure>(&outcomes[i]);
+    records[places[i]] = failure != nullptr ? failed(plan, runs[places[i]], failure->reason)
+                                            : record_of(std::get<lanes::FilterResult>(outcomes[i]), plan);
+  }
+  std::vector<RunRecord> all;
+  for (std::optional<RunRecord>& record : records) {
+    all.push_back(std::move(record).value());
+  }
+  return all;
+}
+
+}  // namespace
+
 RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of,
                   const std::function<void(Flight&&)>& flown) {
-  const auto begun = std::chrono::steady_clock::now();
-  const double cpu_before_s = thread_cpu_s();
-  const std::uint64_t seed = seed_of_run(plan, run);
-  const std::vector<double> draws = draws_of_run(plan, run);
-  RunRecord record;
-  std::optional<RunSetup> setup;
-  try {
-    setup = setup_of(seed, draws);
-  } catch (const std::invalid_argument& error) {
-    record = failed(plan, run, error.what());
+  const Begun begun;
+  if (plan.work == CampaignWork::kFilter && !flown) {
+    return perform_together(plan, {&run, 1}, setup_of).front();
   }
-  if (setup) {
-    try {
-      Flight flight =
-          fly(*setup, plan.limit_rad, flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
-      record = record_of(flight, plan);
+  RunRecord record;
+  std::variant<RunSetup, RunRecord> setup = setup_or_failure(plan, run, setup_of);
+  if (auto* const failure = std::get_if<RunRecord>(&setup)) {
+    record = std::move(*failure);
+  } else {
+    record = unless_it_fails(plan, run, [&] {
+      Flight flight = fly(std::get<RunSetup>(setup), plan.limit_rad,
+                          flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
+      RunRecord its = plan.work == CampaignWork::kFilter ? fly_filters(plan, {&run, 1}, setup_of).front()
+                                                         : record_of(flight, plan);
       if (flown) {
         flown(std::move(flight));
       }
-    } catch (const Stopped&) {
-      throw;
-    } catch (const std::bad_alloc&) {
-      throw;  // it says nothing of the run
-    } catch (const ground::SetupError& error) {
-      record = failed(plan, run, std::string(error.what()) + "; " + error.cure());
-    } catch (const std::exception& error) {
-      record = failed(plan, run, error.what());
+      return its;
+    });
+  }
+  name(plan, run, record);
+  begun.tell({&record, 1});
+  return record;
+}
+
+std::size_t runs_together(const CampaignPlan& plan) {
+  return plan.work == CampaignWork::kFilter ? lanes::kTogether : 1;
+}
+
+std::vector<RunRecord> perform_together(const CampaignPlan& plan, std::span<const std::uint64_t> runs,
+                                        const SetupOf& setup_of) {
+  std::vector<RunRecord> records;
+  if (plan.work == CampaignWork::kFilter) {
+    const Begun begun;
+    records = fly_filters(plan, runs, setup_of);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      name(plan, runs[i], records[i]);
+    }
+    begun.tell(records);
+  } else {
+    for (const std::uint64_t run : runs) {
+      records.push_back(perform(plan, run, setup_of));
     }
   }
-  record.run = run;
-  record.seed = seed;
-  record.draws = draws;
-  record.cpu_s = thread_cpu_s() - cpu_before_s;
-  record.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  return record;
+  return records;
 }
 
 void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const SetupOf& setup_of, unsigned jobs,
                  const Collect& collect) {
   std::mutex one_at_a_time;
+  const std::size_t together = runs_together(plan);
   ground::with_cores(jobs, [&] {
-    ground::for_each_on_all_cores(runs.size(), [&](std::size_t i) {
+    ground::for_each_on_all_cores((runs.size() + together - 1) / together, [&](std::size_t i) {
+      const std::span<const std::uint64_t> some =
+          runs.subspan(i * together, std::min(together, runs.size() - i * together));
       std::vector<RunRecord> records;
       // Many runs keep all cores busy; within a run nothing is gained by more than one, and its CPU time is its own.
-      ground::with_cores(1, [&] { records.push_back(perform(plan, runs[i], setup_of)); });
+      ground::with_cores(1, [&] { records = perform_together(plan, some, setup_of); });
       const std::scoped_lock lock(one_at_a_time);
       collect(std::move(records));
     });

@@ -29,8 +29,10 @@ constexpr double kCertainlyWrong = 1e-6;
 constexpr double kMostWrong = 0.01;
 constexpr std::size_t kWorstOfEach = 3;
 
-double or_infinite(const RunRecord& record, double value) {
-  return record.outcome != RunOutcome::kFailed && std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+double or_infinite(const RunRecord& record, RunQuantity quantity) {
+  const bool is_measured = record.outcome != RunOutcome::kFailed && !record[quantity].empty();
+  const double value = record.at(quantity);
+  return is_measured && std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
 }
 
 double norm_of(const RunRecord& record, RunQuantity quantity, std::size_t from) {
@@ -72,10 +74,10 @@ constexpr std::array<Measure, 11> kMeasures = {{
      Measure::Unit::kRadian, true, [](const RunRecord& record) { return record.at(RunQuantity::kOpenLoopErrorToEnd); }},
     {"drift_settled", "Drift coefficients settled",
      "time since the start after which all coefficients that the pass determines have settled", Measure::Unit::kSecond,
-     true, [](const RunRecord& record) { return or_infinite(record, record.at(RunQuantity::kDriftSettled)); }},
+     true, [](const RunRecord& record) { return or_infinite(record, RunQuantity::kDriftSettled); }},
     {"alignment_settled", "Alignments settled",
      "time since the start after which all alignments that the pass determines have settled", Measure::Unit::kSecond,
-     true, [](const RunRecord& record) { return or_infinite(record, record.at(RunQuantity::kAlignmentSettled)); }},
+     true, [](const RunRecord& record) { return or_infinite(record, RunQuantity::kAlignmentSettled); }},
     {"interval_after", "Correction interval",
      "median time by the gyros alone, with the calibrated parameters, until the attitude error passes the limit",
      Measure::Unit::kSecond, false, [](const RunRecord& record) { return record.at(RunQuantity::kIntervalAfter); },

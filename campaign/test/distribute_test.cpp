@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <span>
 #include <stdexcept>
 
 namespace trihedron::campaign {
@@ -41,9 +42,12 @@ class Fake : public Workers {
     events_.push_back(first);
   }
 
-  void give(std::uint64_t worker, std::uint64_t run) override {
-    given_.emplace_back(worker, run);
-    events_.push_back(becomes_(worker, run));
+  void give(std::uint64_t worker, std::span<const std::uint64_t> runs) override {
+    together_.push_back(runs.size());
+    for (const std::uint64_t run : runs) {
+      given_.emplace_back(worker, run);
+      events_.push_back(becomes_(worker, run));
+    }
   }
   std::vector<WorkerEvent> wait() override {
     if (events_.empty()) {
@@ -54,11 +58,14 @@ class Fake : public Workers {
     return now;
   }
   [[nodiscard]] const std::vector<std::pair<std::uint64_t, std::uint64_t>>& given() const { return given_; }
+  /// How many runs were given at once.
+  [[nodiscard]] const std::vector<std::size_t>& together() const { return together_; }
 
  private:
   Becomes becomes_;
   std::deque<std::vector<WorkerEvent>> events_;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> given_;
+  std::vector<std::size_t> together_;
 };
 
 std::map<std::uint64_t, RunRecord> all_of(const CampaignPlan& plan, std::vector<std::uint64_t> runs, Workers& workers) {
@@ -78,6 +85,36 @@ TEST(Distribute, GivesEachRunOnceToWorkersThatHaveNothingToDo) {
   const auto all = all_of(runs_without_draws(9), {1, 4, 5, 8}, workers);
   EXPECT_EQ(all.size(), 4U);
   EXPECT_THAT(workers.given(), ElementsAre(std::pair(7, 1), std::pair(3, 4), std::pair(7, 5), std::pair(3, 8)));
+}
+
+CampaignPlan filters(std::uint64_t runs) {
+  CampaignPlan plan = runs_without_draws(runs);
+  plan.work = CampaignWork::kFilter;
+  return plan;
+}
+
+TEST(Distribute, GivesRunsOfFiltersEightAtATime) {
+  Fake workers({ready(0)}, [](std::uint64_t worker, std::uint64_t run) { return std::vector{performed(worker, run)}; });
+  const auto all = all_of(filters(30), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 20, 21, 22, 23, 24, 25, 26, 27}, workers);
+  EXPECT_EQ(all.size(), 18U);
+  EXPECT_THAT(workers.together(), ElementsAre(8, 8, 2));
+}
+
+TEST(Distribute, GivesRunsThatWereTogetherWithOneThatEndsItsProcessAlone) {
+  std::uint64_t next = 10;
+  Fake workers({ready(0)}, [&](std::uint64_t worker, std::uint64_t run) -> std::vector<WorkerEvent> {
+    if (worker == 0) {  // the third of those given ends it
+      return run < 2 ? std::vector{performed(worker, run)}
+                     : run == 2 ? std::vector{ended(worker), ready(++next)} : std::vector<WorkerEvent>{};
+    }
+    return run == 2 ? std::vector{ended(worker), ready(++next)} : std::vector{performed(worker, run)};
+  });
+  const auto all = all_of(filters(12), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, workers);
+  ASSERT_EQ(all.size(), 10U);
+  for (const auto& [run, record] : all) {
+    EXPECT_EQ(record.outcome, run == 2 ? RunOutcome::kFailed : RunOutcome::kTrustworthy) << run;
+  }
+  EXPECT_THAT(workers.together(), ElementsAre(8, 1, 1, 1, 1, 1, 1, 2));
 }
 
 TEST(Distribute, WaitsForNobodyWhereNothingIsToBeDone) {

@@ -10,6 +10,7 @@
 #include <limits>
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "trihedron/records/stop.hpp"
@@ -87,6 +88,89 @@ TEST(Campaign, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
   }
   expect_same(one[4], perform(plan, 4, short_flight));
   EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
+}
+
+RunSetup flight_of_eq1(std::uint64_t seed, std::span<const double> draws) {
+  RunSetup setup = short_flight(seed, draws);
+  for (GyroScenario& gyro : setup.scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+  }
+  return setup;
+}
+
+CampaignPlan runs_of_filters(std::uint64_t runs) {
+  CampaignPlan plan = six_runs();
+  plan.runs = runs;
+  plan.work = CampaignWork::kFilter;
+  return plan;
+}
+
+TEST(CampaignOfFilters, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
+  const CampaignPlan plan = runs_of_filters(19);
+  const std::vector<RunRecord> one = performed(plan, 1, flight_of_eq1);
+  const std::vector<RunRecord> three = performed(plan, 3, flight_of_eq1);
+  ASSERT_EQ(one.size(), 19U);
+  ASSERT_EQ(three.size(), 19U);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    expect_same(one[i], three[i]);
+  }
+  expect_same(one[13], perform(plan, 13, flight_of_eq1));
+  EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
+}
+
+TEST(CampaignOfFilters, MeasuresWhatACalibrationOfTheSameFlightsHas) {
+  CampaignPlan plan = runs_of_filters(2);
+  plan.keeps_covariance = true;
+  const std::vector<RunRecord> all = performed(plan, 1, flight_of_eq1);
+  plan.work = CampaignWork::kCalibrate;
+  for (const RunRecord& its : all) {
+    const RunRecord calibrated = perform(plan, its.run, flight_of_eq1);
+    EXPECT_EQ(its.outcome, RunOutcome::kTrustworthy);
+    EXPECT_EQ(its.drift_model, calibrated.drift_model);
+    EXPECT_GT(its.cpu_s, 0);
+    for (const RunQuantityRow& row : kRunQuantityRows) {
+      if (row.quantity > RunQuantity::kAttitudeNormalisedSquare) {
+        EXPECT_TRUE(its[row.quantity].empty()) << row.name;
+        continue;
+      }
+      ASSERT_EQ(its[row.quantity].size(), calibrated[row.quantity].size()) << row.name;
+      double largest = 0;
+      for (const double value : calibrated[row.quantity]) {
+        largest = std::max(largest, std::abs(value));
+      }
+      for (std::size_t i = 0; i < its[row.quantity].size(); ++i) {
+        // A calibration may predict over two samples at once.
+        EXPECT_NEAR(its.at(row.quantity, i), calibrated.at(row.quantity, i), 1e-3 * largest) << row.name;
+      }
+    }
+  }
+}
+
+TEST(CampaignOfFilters, RunsThatFailAreRowsAmongTheOthers) {
+  const auto some_fail = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = flight_of_eq1(seed, draws);
+    if (draws[0] > 3.5) {
+      throw std::invalid_argument("no such scenario");
+    }
+    if (draws[0] > 3) {
+      setup.scenario.star_tracker.dropout_probability = 1;
+    }
+    if (draws[0] > 2.5) {
+      setup.scenario.gyros[0].misalignment_magnitude_rad = -1;
+    }
+    return setup;
+  };
+  const std::vector<RunRecord> all = performed(runs_of_filters(16), 1, some_fail);
+  std::size_t failures = 0;
+  for (const RunRecord& its : all) {
+    const double draw = its.draws[0];
+    EXPECT_EQ(its.outcome == RunOutcome::kFailed, draw > 2.5) << draw;
+    EXPECT_EQ(its.reason.empty(), draw <= 2.5);
+    EXPECT_EQ(its.reason.find("no such scenario") != std::string::npos, draw > 3.5);
+    failures += draw > 2.5 ? 1 : 0;
+  }
+  EXPECT_GT(failures, 3U);
+  EXPECT_LT(failures, 16U);
 }
 
 TEST(Campaign, MeasuresARunAgainstItsTruth) {

@@ -279,8 +279,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command
       ->add_option(
           "--drift-model", arguments->drift_model,
-          "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise: of estimator "
-          "batch field, which is all members by a prior that the pass determines")
+          "Drift model. auto: the one that the pass gives evidence of; field: all members of the drift field, each degree "
+          "as large as the pass shows, of estimator batch alone. Unless the settings say otherwise auto, of estimator "
+          "batch field")
       ->check([](const std::string& name) {
         CalibrationOptions options;
         return set_drift_model(name, options) ? "" : not_one_of(name, {}, drift_model_word_choices());

@@ -1,6 +1,7 @@
 #include "campaign_workers.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -9,6 +10,7 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
@@ -30,7 +32,7 @@ namespace {
 /// processor for those who look.
 constexpr std::chrono::milliseconds kPatience(2);
 
-// Rank 0 says kSayBegin, then "WORKER RUN", at last kSayEnd, or kSayLeave where a rank is lost; the others "WORKER said
+// Rank 0 says kSayBegin, then "WORKER RUN …", at last kSayEnd, or kSayLeave where a rank is lost; the others "WORKER said
 // LINE" and "WORKER ended HOW"; all kSayAlive.
 constexpr std::string_view kSayBegin = "begin";
 constexpr std::string_view kSayEnd = "end";
@@ -51,6 +53,19 @@ std::string_view word_of(std::string_view& text) {
   const std::string_view word = text.substr(0, end);
   text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   return word;
+}
+
+/// Those of a text that has nothing else; none where it has.
+std::vector<std::uint64_t> numbers(std::string_view text) {
+  std::vector<std::uint64_t> values;
+  while (!text.empty()) {
+    const std::optional<std::uint64_t> value = number(word_of(text));
+    if (!value) {
+      return {};
+    }
+    values.push_back(*value);
+  }
+  return values;
 }
 
 std::string text_of(const WorkerNews& news) {
@@ -118,12 +133,12 @@ class RankedWorkers : public campaign::Workers {
     send_to_all(kSayBegin);
   }
 
-  void give(std::uint64_t worker, std::uint64_t run) override {
+  void give(std::uint64_t worker, std::span<const std::uint64_t> runs) override {
     const auto [rank, number] = workers_.at(worker);
     if (rank == 0) {
-      own_.give(number, run);
+      own_.give(number, runs);
     } else {
-      transport_.send(rank, fmt::format("{} {}", number, run));
+      transport_.send(rank, fmt::format("{} {}", number, fmt::join(runs, " ")));
     }
   }
 
@@ -225,13 +240,15 @@ void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const
   };
   say_line(io::digest_of(identity));
   for (std::string line; std::getline(std::cin, line);) {
-    const std::optional<std::uint64_t> run = number(line);
-    if (!run || *run >= file.plan().runs) {
+    const std::vector<std::uint64_t> runs = numbers(line);
+    if (runs.empty() || std::ranges::any_of(runs, [&](std::uint64_t run) { return run >= file.plan().runs; })) {
       throw io::UsageError(fmt::format("--serve: \"{}\" is no number of a run, 0 to {}", line, file.plan().runs - 1));
     }
-    std::string record;
-    ground::with_cores(1, [&] { record = io::format_record(campaign::perform(file.plan(), *run, setup_of)); });
-    say_line(record);
+    std::vector<RunRecord> records;
+    ground::with_cores(1, [&] { records = campaign::perform_together(file.plan(), runs, setup_of); });
+    for (const RunRecord& record : records) {
+      say_line(io::format_record(record));
+    }
   }
   check_stop();
 }
@@ -271,7 +288,7 @@ void serve_rank(Job& job, const std::string& campaign_file, std::size_t jobs) {
       if (message->text != kSayAlive) {
         std::string_view text = message->text;
         const std::optional<std::uint64_t> worker = number(word_of(text));
-        processes.give(worker.value(), number(text).value());
+        processes.give(worker.value(), numbers(text));
       }
     }
   }

@@ -143,7 +143,9 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
   if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
     throw io::UsageError("--pass and --epoch are for an attitude; the epoch of a pass is in its own files");
   }
-  const io::LoadedPass loaded = io::read_pass(arguments.file, selection_of(arguments));
+  const io::NamedPass named =
+      io::read_named_pass(arguments.file, io::TruthUse::kToCompare, selection_of(arguments));
+  const io::LoadedPass& loaded = named.loaded;
   log_pass(common.log, arguments.file, loaded);
   std::vector<std::filesystem::path> inputs = {arguments.file};
   inputs.insert(inputs.end(), arguments.exclude.begin(), arguments.exclude.end());
@@ -153,7 +155,7 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
   const bool was_there = any_is_there(outputs);
   outputs.emplace_back(arguments.output);
   io::expect_apart(inputs, outputs);
-  io::write_pass(arguments.output, loaded.pass, nullptr);
+  io::write_pass(arguments.output, loaded.pass, named.truth_or_null());
   show(
       common,
       [&] {

@@ -105,7 +105,7 @@ std::string words_for(const Mistake& mistake) {
     case Mistake::Kind::kGyrosExchanged:
       return "gyros 1 and 2 have each other's readings";
     case Mistake::Kind::kClock:
-      return fmt::format("fixes hold the attitude {:+.3f} s after their stamp", mistake.offset_s);
+      return fmt::format("fixes were taken {:+.3f} s after their stamp", mistake.offset_s);
     case Mistake::Kind::kNothingTried:
       return "no usual mistake explains it: fixes of another pass or spacecraft, clocks more than ten minutes apart, "
              "or "

@@ -108,7 +108,7 @@ std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {
     return "Clocks      not shown by this pass: the body turns too evenly, or the pass is too short\n";
   }
   std::string text = fmt::format(
-      "Clocks      fixes hold the attitude {:+.4f} s ± {:.2f} ms after their stamp in the middle of the pass; {:+.4g} "
+      "Clocks      fixes were taken {:+.4f} s ± {:.2f} ms after their stamp in the middle of the pass; {:+.4g} "
       "± "
       "{:.2g} ppm\n",
       clocks->mid_offset_s.value, 1e3 * clocks->mid_offset_s.sigma, 1e6 * clocks->rate_s_s.value,
@@ -126,7 +126,7 @@ std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {
     text += fmt::format(
         "            between t = {:.0f} s and {:.0f} s {} {:+.2f} ± {:.2f} ms later than over the rest\n",
         to_seconds(step.from - epoch), to_seconds(step.until - epoch),
-        step.gyro < 0 ? std::string("fixes hold the attitude") : fmt::format("gyro {} is stamped", step.gyro + 1),
+        step.gyro < 0 ? std::string("fixes were taken") : fmt::format("gyro {} is stamped", step.gyro + 1),
         1e3 * step.change_s.value, 1e3 * step.change_s.sigma);
   }
   return text;

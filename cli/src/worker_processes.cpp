@@ -1,6 +1,7 @@
 #include "worker_processes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -84,10 +85,10 @@ WorkerProcesses::Process WorkerProcesses::start() {
   return process;
 }
 
-void WorkerProcesses::give(std::uint64_t worker, std::uint64_t run) {
+void WorkerProcesses::give(std::uint64_t worker, std::span<const std::uint64_t> runs) {
   const auto process = std::ranges::find(processes_, worker, &Process::number);
   if (process != processes_.end()) {
-    const std::string line = fmt::format("{}\n", run);
+    const std::string line = fmt::format("{}\n", fmt::join(runs, " "));
     static_cast<void>(::send(process->socket.number(), line.data(), line.size(), MSG_NOSIGNAL));
   }
 }

@@ -41,6 +41,21 @@ star_tracker.dropout_probability = {grid = [0, 0.1]}
 attitude.reference = {choice = ["orbital", "yaw-steered"]}
 gyro.misalignment_magnitude = {normal = ["20arcmin", "5arcmin"], min = "1arcmin"}
 """
+# Of the filter alone: drift of eq. (1), so that runs go side by side, and a grid over what makes some of them go by themselves.
+FILTERS = """
+[campaign]
+name = "Filters"
+repeats = 10
+seed = 5
+work = "filter"
+[base.scenario]
+duration = "10min"
+[base.gyro.drift]
+outside_sigma = "0rad/s"
+[vary]
+star_tracker.period = {grid = ["3s", "1s"]}
+star_tracker.dropout_probability = {choice = [0, 0.1]}
+"""
 # Long enough that a test is not late to end it, on a busy machine as well.
 LONG_CAMPAIGN = CAMPAIGN.replace("repeats = 2", "repeats = 20")
 
@@ -318,6 +333,29 @@ def test_covariances_are_kept_where_they_are_asked_for(finished, tmp_path):
     assert "bit for bit" in alone.stdout
 
 
+def test_runs_of_filters_are_the_same_together_and_alone(tmp_path):
+    (tmp_path / "c.toml").write_text(FILTERS)
+    text = run("campaign", tmp_path / "c.toml", "-o", tmp_path / "one", "--jobs", "1").stdout
+    assert "20 trustworthy" in text and "NEES" in text and "Correction interval" not in text and "settled" not in text
+    run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "two", "--jobs", "2")
+    assert table(tmp_path / "one") == table(tmp_path / "two")
+    with xarray.open_dataset(tmp_path / "one" / "runs.nc") as runs:
+        assert "open_loop_error" not in runs and (runs.nees > 0).all() and (runs.nees_degrees_of_freedom == 20).all()
+    # Some runs are lost: those that are flown again have other company.
+    journal = tmp_path / "two" / "runs.journal"
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join(line for i, line in enumerate(lines) if i in (0, 3, 4, 9, 15)))
+    run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "two", "--resume")
+    assert table(tmp_path / "one") == table(tmp_path / "two")
+    # One alone, and what the command makes of its flight beside it.
+    assert "bit for bit" in run("campaign", tmp_path / "c.toml", "-o", tmp_path / "one", "--only", "4").stdout
+    assert (tmp_path / "one" / "run-4" / "report.html").exists()
+    shown = json.loads(run("--json", "campaign", tmp_path / "c.toml", "--only", "13").stdout)
+    with xarray.open_dataset(tmp_path / "one" / "runs.nc") as runs:
+        assert shown["values"]["nees"] == [float(runs.nees.sel(run=13))]
+    jsonschema.validate(json.loads(run("--json", "campaign", tmp_path / "c.toml", "-o", tmp_path / "one", "--resume").stdout), schema("campaign-output"))
+
+
 # What is refused before the work.
 
 
@@ -366,6 +404,9 @@ def with_key(line):
     (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
     (CAMPAIGN.replace("seed = 5", 'covariance = "yes"'), ["c.toml:5:", "kept"]),
+    (CAMPAIGN.replace("seed = 5", 'work = "filtre"'), ["c.toml:5:", "calibrate", "filter"]),
+    (FILTERS + '[calibration]\nestimator = "batch"\n', ["batch is no filter", "invariant"]),
+    (FILTERS + 'calibration.estimator = {grid = ["invariant", "batch"]}\n', ["c.toml:14:", "batch is no filter", "can be drawn"]),
     (CAMPAIGN.replace("repeats = 2", "repeat = 2"), ["c.toml:4:", "did you mean \"repeats\""]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 1000000"), ["c.toml:2:", "6e+06 runs", "latin-hypercube"]),
     (with_key("\n".join(f'gyro.readout.{key} = {{grid = [{", ".join(["0"] * 100)}]}}' for key in

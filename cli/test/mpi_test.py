@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from campaign_test import CAMPAIGN, flown, long_one, records, table, until
+from campaign_test import CAMPAIGN, FILTERS, flown, long_one, records, table, until
 from outputs_test import faults
 from program import BUILD, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
 
@@ -85,10 +85,10 @@ def is_caught_while_it_starts(worker):
 
 def test_serve_performs_the_runs_that_it_is_given(alone):
     directory, _ = alone
-    result = run("campaign", directory / "c.toml", "--serve", input="7\n2\n")
+    result = run("campaign", directory / "c.toml", "--serve", input="7\n2 11 4\n")
     assert result.returncode == TRUSTWORTHY and not result.stderr
     digest, *lines = result.stdout.splitlines()
-    assert len(digest) == 16 and len(lines) == 2
+    assert len(digest) == 16 and len(lines) == 4
     journal = (directory / "out" / "runs.journal").read_text().splitlines()
     assert digest in journal[0]
     for line in lines:
@@ -99,7 +99,7 @@ def untimed(line):
     return line[9:].split('"cpu_s"')[0]
 
 
-@pytest.mark.parametrize("given", ["12\n", "-1\n", "1 2\n", "x\n", "\n"])
+@pytest.mark.parametrize("given", ["12\n", "-1\n", "1 12\n", "x\n", "1 x\n", "\n"])
 def test_serve_refuses_what_is_no_run(alone, given):
     result = run("campaign", alone[0] / "c.toml", "--serve", input=given)
     assert result.returncode == WRONG_USAGE
@@ -153,6 +153,15 @@ def test_a_job_gives_the_table_of_one_process(alone, tmp_path, ranks, jobs):
     assert result.stdout.count("Test: 12 runs") == 1
     assert table(tmp_path / "out") == table(directory / "out")
     assert sorted(os.listdir(tmp_path / "out")) == ["report.html", "runs.journal", "runs.nc", "times.csv"]
+
+
+@needs_mpi
+@pytest.mark.long
+def test_a_job_gives_the_table_of_one_process_where_runs_go_side_by_side(tmp_path):
+    directory, status = flown(tmp_path, FILTERS)
+    result = subprocess.run(mpirun(2, "--quiet", "campaign", directory / "c.toml", "-o", tmp_path / "job", "--jobs", "1"), capture_output=True, text=True)
+    assert result.returncode == status, result.stderr
+    assert table(tmp_path / "job") == table(directory / "out")
 
 
 @needs_mpi

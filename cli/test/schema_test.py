@@ -166,7 +166,7 @@ def test_a_navigation_that_has_lost_a_gyro_tells_no_readiness(flown, tmp_path):
 
 
 def test_a_clock_that_steps_is_described(tmp_path):
-    """One star tracker, stamps 0.1 s later for half an hour: fixes hold the attitude that much before their stamp."""
+    """One star tracker, stamps 0.1 s later for half an hour: fixes were taken that much before their stamp."""
     assert run("--quiet", "simulate", "-", "-o", tmp_path / "pass", input='[scenario]\nseed = 3\nduration = "100min"\n').returncode == TRUSTWORTHY
     fixes = tmp_path / "pass" / "star_tracker.csv"
     header, *lines = fixes.read_text().splitlines()

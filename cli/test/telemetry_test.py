@@ -49,6 +49,20 @@ def test_the_example_becomes_a_pass(tmp_path):
     assert settings["star_tracker"]["noise_rad"][2] == pytest.approx(math.radians(20 / 3600), rel=1e-12)
 
 
+def test_a_part_of_a_simulated_pass_keeps_its_truth(tmp_path):
+    (tmp_path / "scenario.toml").write_text('[scenario]\nduration = "10min"\n')
+    done("--quiet", "simulate", tmp_path / "scenario.toml", "-o", tmp_path / "whole")
+    done("--quiet", "import", tmp_path / "whole", "-o", tmp_path / "part.nc", "--from", "2009-05-20T00:01:00", "--to", "2009-05-20T00:05:00")
+    done("--quiet", "import", tmp_path / "part.nc", "-o", tmp_path / "part")
+    truth = rows(tmp_path / "whole/truth.csv")
+    assert rows(tmp_path / "part/truth.csv") == [[row[0] - 60, *row[1:]] for row in truth if 60 <= row[0] <= 300]
+    assert json.loads((tmp_path / "part/truth.json").read_text())["gyros"] == json.loads((tmp_path / "whole/truth.json").read_text())["gyros"]
+    # A truth that is not whole is left out, and this is told.
+    (tmp_path / "part/truth.json").unlink()
+    assert "1 truth that is not whole" in done("import", tmp_path / "part", "-o", tmp_path / "without").stdout
+    assert not (tmp_path / "without/truth.csv").exists()
+
+
 def test_every_command_takes_it_as_a_pass(tmp_path):
     (tmp_path / "told.toml").write_text(TOLD)
     told = ("--config", tmp_path / "told.toml")
@@ -194,7 +208,7 @@ MISTAKES = {
     "mirrored": (spoil_fixes(lambda q: [q[0], -q[1], q[2], q[3]]), "star_tracker", "mirrored along y"),
     "gyro axes exchanged": (spoil_gyro(lambda h: [h[2], h[1], h[0]]), "gyro1", "readings of gyro 1: axes in another order (what is told as z is x, x is z)"),
     "gyro mirrored": (spoil_gyro(lambda h: [h[0], -h[1], h[2]]), "gyro1", "readings of gyro 1: mirrored along y"),
-    "late": (lambda gyro, fixes: (gyro, [[row[0] + 599.4, *row[1:]] for row in fixes if row[0] < 3600]), "clock", "fixes hold the attitude -599.4"),
+    "late": (lambda gyro, fixes: (gyro, [[row[0] + 599.4, *row[1:]] for row in fixes if row[0] < 3600]), "clock", "fixes were taken -599.4"),
 }
 
 

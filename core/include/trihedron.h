@@ -65,9 +65,10 @@ uint32_t trihedron_command(trihedron_application* its, uint32_t command, uint32_
 uint32_t trihedron_on_gyro(trihedron_application* its, const trihedron_gyro_sample* sample);
 
 /**
- * One fix: of `trihedron_fix`, of this fix, or of one before it where they come so fast that it is dealt with now. It waits
- * for the samples round it; `last_fix` of the housekeeping record then says what was done with it. A fix whose time is more than
- * 1.4 s before that of the latest sample comes too late, since its samples have been passed: rejected_out_of_order.
+ * One fix. It waits for the gyro samples before and after its time; what was done with it then stands in `last_fix` of the
+ * housekeeping record. Returns a value of `trihedron_fix`: usually that it waits; where fixes come faster than they are
+ * dealt with, what was done with an earlier one. A fix whose time is more than 1.4 s before that of the latest sample comes too
+ * late, since the samples of its time are gone: rejected_out_of_order.
  */
 uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* fix);
 

@@ -563,7 +563,7 @@ void read_latencies(const JsonNode& node, std::size_t gyros, ClockCorrection& cl
 
 Members clock_members(ClockCorrection& clocks, std::size_t gyros) {
   return {number_member("clock_offset_s", clocks.offset_s, limits::kClockOffset_s,
-                        "a fix stamped t holds the attitude at t + this + clock_rate_s_s (t - epoch)"),
+                        "a fix stamped t gives the attitude at t + this + clock_rate_s_s (t - epoch)"),
           number_member("clock_rate_s_s", clocks.rate_s_s, limits::kClockRate_s_s, "of the star tracker"),
           {"latency_s", "of each gyro: a reading stamped t holds the direction at t - this",
            array_of(number_schema(limits::kLatency_s)),

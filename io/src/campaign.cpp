@@ -403,6 +403,10 @@ void read_varied(const toml::table& table, const fs::path& file, const std::stri
   }
 }
 
+// Of work = "filter".
+constexpr std::string_view kNoFilter = "estimator batch is no filter, and with work = \"filter\" nothing else is flown";
+constexpr std::string_view kTakeAFilter = "take estimator invariant or paper, or work = \"calibrate\"";
+
 /// Of [campaign].
 struct Head {
   std::string name = "Campaign";
@@ -410,6 +414,7 @@ struct Head {
   std::uint64_t seed = 0;
   std::uint64_t repeats = 0;
   enum class Sampling { kRandom, kLatinHypercube } sampling = Sampling::kRandom;
+  CampaignWork work = CampaignWork::kCalibrate;
   double limit_rad = CampaignPlan{}.limit_rad;
   bool keeps_covariance = false;
 };
@@ -441,6 +446,10 @@ Fields head_fields(Head& head) {
                            "of the distributions: each run for itself, or each key in as many equal parts as there are "
                            "runs, one run in each",
                            {{"random", Sampling::kRandom}, {"latin-hypercube", Sampling::kLatinHypercube}}),
+          choice<CampaignWork>("work", head.work,
+                               "calibrate: each run does all that the command does; filter: the filter alone, with eq. "
+                               "(1) and the noise as told, whose parameters and attitude are compared with the truth",
+                               {{"calibrate", CampaignWork::kCalibrate}, {"filter", CampaignWork::kFilter}}),
           limit(head.limit_rad),
           choice<bool>("covariance", head.keeps_covariance, "of the parameters of each run: whether the table has it",
                        {{"left-out", false}, {"kept", true}})};
@@ -537,6 +546,11 @@ struct CampaignFile::Content {
 
   static constexpr const char* kNarrow = "narrow the distribution, by min and max where it has no ends";
 
+  /// Whether there is what the campaign is to fly.
+  [[nodiscard]] bool has_filter(const CalibrationOptions& of) const {
+    return plan.work != CampaignWork::kFilter || of.estimator != Estimator::kBatch;
+  }
+
   void try_draw(const Varied& one, double draw, const ScenarioCheck& check) const {
     const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
                                                                   : fmt::format("{}{}", draw, one.input.unit);
@@ -545,7 +559,9 @@ struct CampaignFile::Content {
     try {
       put_draw(drawn_into, one, draw);
       if (one.input.is_setting()) {
-        static_cast<void>(config_of_table(drawn_into, settings_file, settings_name));
+        if (!has_filter(config_of_table(drawn_into, settings_file, settings_name))) {
+          refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, kNoFilter), std::string(kTakeAFilter));
+        }
       } else {
         check(scenario_of_table(drawn_into, scenario_file, "the scenario"));
       }
@@ -721,9 +737,13 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
   content->count_runs(head);
   content->plan.name = head.name;
   content->plan.seed = head.seed;
+  content->plan.work = head.work;
   content->plan.limit_rad = head.limit_rad;
   content->plan.keeps_covariance = head.keeps_covariance;
   content->plan.latin_hypercube = head.sampling == Head::Sampling::kLatinHypercube;
+  if (!content->has_filter(content->options)) {
+    throw InputRefused(file, {}, std::string(kNoFilter), std::string(kTakeAFilter));
+  }
   for (Varied& one : content->varied) {
     if (one.input.distribution.kind == Kind::kFollows) {
       content->follow(one);
@@ -751,6 +771,7 @@ CampaignIdentity CampaignFile::identity(std::string_view version) const {
                             {"campaign.runs", std::to_string(plan.runs)},
                             {"campaign.repeats", std::to_string(plan.repeats)},
                             {"campaign.sampling", plan.latin_hypercube ? "latin-hypercube" : "random"},
+                            {"campaign.work", plan.work == CampaignWork::kFilter ? "filter" : "calibrate"},
                             {"campaign.limit", format_angle(plan.limit_rad)},
                             {"campaign.covariance", plan.keeps_covariance ? "kept" : "left-out"}};
   for (const Varied& one : content_->varied) {

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <iterator>
 #include <set>
 #include <system_error>
 
@@ -84,7 +86,35 @@ std::string name_of_pass(const std::filesystem::path& path) {
   return text.empty() ? "pass" : text;  // the root has no name
 }
 
-std::optional<Truth> read_truth_of(const NamedPass& pass) {
+/// What is told of a star tracker by the time since an epoch, by that since a later one.
+void move_epoch(double by_s, double orbital_rate_rad_s, Truth::StarTracker& its) {
+  its.clock_offset_s += its.clock_rate_s_s * by_s;
+  const double sine = std::sin(orbital_rate_rad_s * by_s);
+  const double cosine = std::cos(orbital_rate_rad_s * by_s);
+  const Eigen::Vector3d before = its.orbital_sine_rad;
+  its.orbital_sine_rad = cosine * before - sine * its.orbital_cosine_rad;
+  its.orbital_cosine_rad = sine * before + cosine * its.orbital_cosine_rad;
+}
+
+/// What lies between the ends of the selection by which the pass was read, counted from its epoch.
+void keep_within(const Selection& selection, Duration epoch_moved, Truth& truth) {
+  const auto begin = selection.from ? std::ranges::lower_bound(truth.t, *selection.from) : truth.t.begin();
+  const auto end = selection.to ? std::ranges::upper_bound(truth.t, *selection.to) : truth.t.end();
+  const std::ptrdiff_t first = begin - truth.t.begin();
+  const std::ptrdiff_t last = std::max(end - truth.t.begin(), first);
+  const auto keep = [&](auto& values, std::ptrdiff_t of_each) {
+    values.erase(values.begin() + last * of_each, values.end());
+    values.erase(values.begin(), values.begin() + first * of_each);
+  };
+  keep(truth.t, 1);
+  keep(truth.q_in_c, 1);
+  keep(truth.h_in, 3 * std::ssize(truth.gyros));
+  for (Truth::StarTracker& head : truth.star_trackers) {
+    move_epoch(to_seconds(epoch_moved), truth.orbital_rate_rad_s, head);
+  }
+}
+
+std::optional<Truth> read_truth_of(const NamedPass& pass, const Selection& selection) {
   std::optional<Truth> truth = read_truth(pass.path);
   if (truth && truth->gyros.size() != static_cast<std::size_t>(pass.pass().gyro.gyros)) {
     throw InputRefused(
@@ -92,15 +122,21 @@ std::optional<Truth> read_truth_of(const NamedPass& pass) {
         fmt::format("the truth has {} gyros, the telemetry {}", truth->gyros.size(), pass.pass().gyro.gyros),
         "give the truth of this pass, or none");
   }
+  if (truth) {
+    keep_within(selection, pass.loaded.epoch_moved, *truth);
+    if (truth->t.empty()) {
+      truth.reset();
+    }
+  }
   return truth;
 }
 
 }  // namespace
 
-NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use) {
-  NamedPass named{path, name_of_pass(path), read_pass(path), {}};
+NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use, const Selection& selection) {
+  NamedPass named{path, name_of_pass(path), read_pass(path, selection), {}};
   try {
-    named.truth = read_truth_of(named);
+    named.truth = read_truth_of(named, selection);
   } catch (const InputIncomplete& refused) {
     if (use == TruthUse::kNeeded) {
       throw;

@@ -328,7 +328,9 @@ LoadedPass screened(UnscreenedPass raw, const fs::path& path, const Selection& s
   raw.selection.from = selection.from ? selection.from : raw.selection.from;
   raw.selection.to = selection.to ? selection.to : raw.selection.to;
   raw.selection.exclude.insert(raw.selection.exclude.end(), selection.exclude.begin(), selection.exclude.end());
+  const Time epoch = raw.settings.epoch;
   select(raw, path, loaded.defects);
+  loaded.epoch_moved = raw.settings.epoch - epoch;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, raw.settings_file, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
     StarTrackerTelemetry& fixes =

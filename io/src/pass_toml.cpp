@@ -208,7 +208,7 @@ Fields star_tracker_fields(PassSettings& settings, const fs::path& file, Told to
           three_numbers(kMounting, settings.star_tracker_mounting_rotation_vector_rad, limits::kRotation_rad,
                         "of the first head in the body, as designed: v_body = exp([m×]) v_c"),
           one_number(kClockOffset, settings.star_tracker_clock_offset_s, limits::kClockOffset_s,
-                     "a fix stamped t holds the attitude at t + offset; stamps are corrected when the pass is read"),
+                     "a fix stamped t gives the attitude at t + offset; stamps are corrected when the pass is read"),
           one_number(kClockRate, settings.star_tracker_clock_rate_s_s, limits::kClockRate_s_s,
                      "by which that offset grows from the epoch on"),
           further_heads(settings, file)};

@@ -352,10 +352,10 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   return Fields{
              three_quantities("noise", head.noise_rad, kAngle, limits::kSizeOfAngle_rad,
                               "1-sigma about its x, y, z, white"),
-             signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t holds the attitude at t + offset"),
+             signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t gives the attitude at t + offset"),
              one_number("clock_rate", head.clock_rate, limits::kClockRate_s_s,
                         "by which that offset grows, in seconds per second from the start of the pass on"),
-             signed_duration("latency", head.latency_s, "a fix stamped t holds the attitude at t - latency"),
+             signed_duration("latency", head.latency_s, "a fix stamped t gives the attitude at t - latency"),
              three_quantities("orbital_sine", head.orbital_sine_rad, kAngle, "of the error at orbital period"),
              three_quantities("orbital_cosine", head.orbital_cosine_rad, kAngle, "of the error at orbital period"),
              three_quantities("field_error", head.field_error_rad, kAngle, limits::kSizeOfAngle_rad,

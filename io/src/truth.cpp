@@ -89,7 +89,7 @@ Json gyro_json(const Truth::Gyro& gyro) {
 
 Members star_tracker_members(Truth::StarTracker& head) {
   return {
-      {"clock_offset_s", "a fix stamped t holds the attitude at t + offset", number_schema(),
+      {"clock_offset_s", "a fix stamped t gives the attitude at t + offset", number_schema(),
        [&head](const JsonNode& node) { head.clock_offset_s = node.number(); }},
       optional_member({"clock_rate_s_s", "by which that offset grows from the start of the pass on", number_schema(),
                        [&head](const JsonNode& node) { head.clock_rate_s_s = node.number(); }}),

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -102,6 +103,47 @@ TEST_F(NamedPasses, HaveATruthOnlyWhereThereIsOne) {
   const NamedPass with = read_named_pass(directory_ / "with.nc");
   ASSERT_NE(with.truth_or_null(), nullptr);
   EXPECT_EQ(with.truth_or_null()->gyros.size(), 2U);
+}
+
+TEST_F(NamedPasses, HaveTheTruthBetweenTheEndsOfTheSelection) {
+  save("pass", "00");
+  const Pass pass = read_pass(directory_ / "pass").pass;
+  Truth whole = clean_truth();
+  ASSERT_GE(whole.t.size(), 27U);
+  for (std::size_t i = 0; i < whole.h_in.size(); ++i) {
+    whole.h_in[i] += 1e-6 * static_cast<double>(i);  // tells one row from another
+  }
+  write_pass(directory_ / "with.nc", pass, &whole);
+  const auto truth_of = [&](const Selection& selection) {
+    return read_named_pass(directory_ / "with.nc", TruthUse::kNeeded, selection).truth;
+  };
+
+  const std::optional<Truth> read = truth_of({});
+  ASSERT_TRUE(read.has_value());
+  const std::optional<Truth> some = truth_of({whole.t[5], whole.t[26], {}});
+  ASSERT_TRUE(some.has_value());
+  EXPECT_EQ(some->t, std::vector<Time>(whole.t.begin() + 5, whole.t.begin() + 27));
+  EXPECT_EQ(some->q_in_c.size(), 22U);
+  EXPECT_EQ(some->h_in, std::vector<double>(read->h_in.begin() + 5 * 6, read->h_in.begin() + 27 * 6));
+}
+
+TEST_F(NamedPasses, HaveATruthThatCountsFromTheEpochOfTheSelection) {
+  save("pass", "00");
+  Truth whole = clean_truth();
+  whole.orbital_rate_rad_s = 0.04;
+  write_pass(directory_ / "with.nc", read_pass(directory_ / "pass").pass, &whole);
+  const Selection selection{whole.t[5], {}, {}};
+  const std::optional<Truth> some = read_named_pass(directory_ / "with.nc", TruthUse::kNeeded, selection).truth;
+  ASSERT_TRUE(some.has_value());
+  const auto error_at = [](const Truth& truth, double t_s) -> Eigen::Vector3d {
+    const Truth::StarTracker& head = truth.star_trackers[0];
+    const double phase = truth.orbital_rate_rad_s * t_s;
+    return std::sin(phase) * head.orbital_sine_rad + std::cos(phase) * head.orbital_cosine_rad;
+  };
+  const double moved_s = to_seconds(whole.t[5] - whole.t[0]);
+  EXPECT_LT((error_at(*some, 20) - error_at(whole, 20 + moved_s)).norm(), 1e-15);
+  const Truth::StarTracker& before = whole.star_trackers[0];
+  EXPECT_DOUBLE_EQ(some->star_trackers[0].clock_offset_s, before.clock_offset_s + before.clock_rate_s_s * moved_s);
 }
 
 TEST_F(NamedPasses, RefuseATruthOfAnotherNumberOfGyros) {

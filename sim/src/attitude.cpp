@@ -6,6 +6,7 @@
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "trihedron/records/stop.hpp"
 
@@ -242,11 +243,17 @@ Quaterniond AttitudeSpline::at(double t_s) const {
 
 AttitudeProgramme::AttitudeProgramme(const AttitudeScenario& scenario, const Ephemeris& ephemeris, std::uint64_t seed,
                                      double begin_s, double end_s)
-    : reference_(reference_samples(scenario, ephemeris, begin_s, end_s)), jitter_rad_(scenario.jitter_rad) {
+    : AttitudeProgramme(scenario,
+                        std::make_shared<AttitudeSpline>(reference_samples(scenario, ephemeris, begin_s, end_s)), seed,
+                        begin_s, end_s) {}
+
+AttitudeProgramme::AttitudeProgramme(const AttitudeScenario& scenario, std::shared_ptr<const AttitudeSpline> reference,
+                                     std::uint64_t seed, double begin_s, double end_s)
+    : reference_(std::move(reference)), jitter_rad_(scenario.jitter_rad) {
   // A recording may end with the pass. The body rate is evaluated a little beyond the end, where the spline still
   // holds.
   constexpr double kSlack_s = 0.2;
-  if (!(reference_.begin_s() <= begin_s + kSlack_s && reference_.end_s() >= end_s - kSlack_s)) {
+  if (!(reference_->begin_s() <= begin_s + kSlack_s && reference_->end_s() >= end_s - kSlack_s)) {
     throw std::invalid_argument("recorded attitude: must cover " + std::to_string(begin_s) + " … " +
                                 std::to_string(end_s) + " s");
   }
@@ -264,7 +271,7 @@ AttitudeProgramme::AttitudeProgramme(const AttitudeScenario& scenario, const Eph
 }
 
 Rot<In, C> AttitudeProgramme::at(double t_s) const {
-  const Quaterniond steered = reference_.at(t_s) * slews_.at(t_s);
+  const Quaterniond steered = reference_->at(t_s) * slews_.at(t_s);
   return Rot<In, C>::assume(jitter_ ? steered * turn(jitter_rad_ * jitter_->at(t_s)) : steered);
 }
 

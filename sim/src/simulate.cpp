@@ -85,29 +85,6 @@ void check(const Scenario& scenario) {
   }
 }
 
-PassSettings settings(const Scenario& scenario) {
-  PassSettings settings;
-  settings.spacecraft = scenario.spacecraft;
-  settings.epoch = scenario.epoch;
-  settings.duration = scenario.duration;
-  settings.gyro_period = scenario.gyro_period;
-  settings.star_tracker_period = scenario.star_tracker_period;
-  settings.star_tracker_noise_rad = scenario.star_tracker.noise_rad;
-  for (const StarTrackerScenario& head : scenario.further_star_trackers) {
-    settings.further_star_trackers.push_back(
-        {head.noise_rad, head.mounting_rotation_vector_rad, head.alignment_prior_sigma_rad});
-  }
-  for (const GyroScenario& gyro : scenario.gyros) {
-    GyroPrior prior;
-    prior.readout_noise_rad = gyro.readout.noise_rad;
-    prior.drift_common_sigma_rad_s = gyro.drift.prior_sigma_rad_s;
-    prior.alignment_rotation_vector_rad = gyro.mounting_rotation_vector_rad;
-    prior.alignment_sigma_rad.setConstant(gyro.alignment_prior_sigma_rad);
-    settings.gyros.push_back(prior);
-  }
-  return settings;
-}
-
 void append(std::vector<double>& values, const Eigen::Vector3d& v) { values.insert(values.end(), v.begin(), v.end()); }
 
 void record_truth(Time t, const Rot<In, C>& C_in_c, const std::vector<Gyro>& gyros, Truth& truth) {
@@ -136,6 +113,44 @@ Truth::StarTracker truth_of(const StarTrackerScenario& head) {
 
 }  // namespace
 
+PassSettings settings_of(const Scenario& scenario) {
+  PassSettings settings;
+  settings.spacecraft = scenario.spacecraft;
+  settings.epoch = scenario.epoch;
+  settings.duration = scenario.duration;
+  settings.gyro_period = scenario.gyro_period;
+  settings.star_tracker_period = scenario.star_tracker_period;
+  settings.star_tracker_noise_rad = scenario.star_tracker.noise_rad;
+  for (const StarTrackerScenario& head : scenario.further_star_trackers) {
+    settings.further_star_trackers.push_back(
+        {head.noise_rad, head.mounting_rotation_vector_rad, head.alignment_prior_sigma_rad});
+  }
+  for (const GyroScenario& gyro : scenario.gyros) {
+    GyroPrior prior;
+    prior.readout_noise_rad = gyro.readout.noise_rad;
+    prior.drift_common_sigma_rad_s = gyro.drift.prior_sigma_rad_s;
+    prior.alignment_rotation_vector_rad = gyro.mounting_rotation_vector_rad;
+    prior.alignment_sigma_rad.setConstant(gyro.alignment_prior_sigma_rad);
+    settings.gyros.push_back(prior);
+  }
+  return settings;
+}
+
+double margin_s(const Scenario& scenario) {
+  const double duration_s = to_seconds(scenario.duration);
+  double margin_s = 0;
+  const auto include = [&](const StarTrackerScenario& head) {
+    margin_s = std::max(margin_s, std::abs(head.clock_offset_s) + std::abs(head.clock_rate) * duration_s +
+                                      std::abs(head.latency_s) + 0.1);
+  };
+  include(scenario.star_tracker);
+  std::ranges::for_each(scenario.further_star_trackers, include);
+  for (const GyroScenario& gyro : scenario.gyros) {
+    margin_s = std::max(margin_s, std::abs(gyro.readout.latency_s));
+  }
+  return margin_s;
+}
+
 void expect_possible(const Scenario& scenario) { check(scenario); }
 
 SimulatedPass simulate(const Scenario& scenario) {
@@ -144,16 +159,7 @@ SimulatedPass simulate(const Scenario& scenario) {
   const double step_s = to_seconds(scenario.gyro_period);
   std::vector<StarTrackerScenario> heads{scenario.star_tracker};
   heads.insert(heads.end(), scenario.further_star_trackers.begin(), scenario.further_star_trackers.end());
-  // Fixes look at C(t + offset), and their rate a little to both sides; readings at C(t − latency).
-  double margin_s = 0;
-  for (const StarTrackerScenario& head : heads) {
-    margin_s = std::max(margin_s, std::abs(head.clock_offset_s) + std::abs(head.clock_rate) * duration_s +
-                                      std::abs(head.latency_s) + 0.1);
-  }
-  for (const GyroScenario& gyro : scenario.gyros) {
-    margin_s = std::max(margin_s, std::abs(gyro.readout.latency_s));
-  }
-
+  const double margin_s = sim::margin_s(scenario);
   const std::unique_ptr<Ephemeris> ephemeris = ephemeris_of(scenario.orbit, -margin_s, duration_s + margin_s);
   const Ephemeris& orbit = *ephemeris;
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
@@ -172,7 +178,7 @@ SimulatedPass simulate(const Scenario& scenario) {
   }
 
   SimulatedPass result;
-  result.pass.settings = settings(scenario);
+  result.pass.settings = settings_of(scenario);
   GyroTelemetry& telemetry = result.pass.gyro;
   telemetry.gyros = static_cast<int>(gyros.size());
   const auto samples = static_cast<std::size_t>(scenario.duration / scenario.gyro_period) + 1;

@@ -435,7 +435,7 @@ Restamped with_stamps(const Pass& pass, const RegularStamps& regular) {
   return result;
 }
 
-/// How much later after their stamps the fixes of further star trackers hold the attitude than those of the first.
+/// How much later after their stamps the fixes of further star trackers were taken than those of the first.
 std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& first_s) {
   std::vector<Measured> apart_s;
   Pass of_one;

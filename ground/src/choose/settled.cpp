@@ -146,6 +146,12 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   return options;
 }
 
+CalibrationOptions settled_as_told(CalibrationOptions options) {
+  options.find_noise = false;
+  leave_out_what_is_open(options);
+  return options;
+}
+
 CalibrationOptions settled_for_flight(const PassSettings& settings, const CalibrationOptions& options) {
   CalibrationOptions settled = settled_before(settings, options);
   settled.widen_where_correlated = options.corrections.take_parameters;

@@ -377,7 +377,7 @@ VectorXd TurnFit::rate_of(int gyro) const {
   return gyro == 0 ? unit(Unknowns::rate()) : VectorXd(unit(Unknowns::rate()) + unit(unknowns_.late_rate(gyro)));
 }
 
-/// How the unknowns change where the stamps of a gyro are later by a unit, or fixes hold the attitude so much later
+/// How the unknowns change where the stamps of a gyro are later by a unit, or fixes were taken so much later
 /// (−1).
 VectorXd TurnFit::by_stepping(int gyro) const {
   if (gyro > 0) {

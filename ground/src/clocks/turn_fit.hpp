@@ -39,7 +39,7 @@ struct Interval {
 
 /// A clock that is off by more or less over a part of the pass than over the rest.
 struct Stepping {
-  int gyro = -1;  ///< whose stamps are later there; −1: fixes hold the attitude later after their stamps
+  int gyro = -1;  ///< whose stamps are later there; −1: fixes were taken later after their stamps
   Interval part;
 };
 

@@ -56,7 +56,7 @@ Eigen::Vector3d direction_at(const Pass& pass, Time t, int gyro) {
   return std::abs(h.norm() - 1) < 0.01 ? Eigen::Vector3d(h.normalized()) : none;
 }
 
-/// Windows that are spread over the pass, with fixes that are spread over each. `offset`: a fix holds the attitude so
+/// Windows that are spread over the pass, with fixes that are spread over each. `offset`: a fix gives the attitude so
 /// long after its stamp.
 std::vector<Window> windows_of(const Pass& pass, Duration offset) {
   const StarTrackerTelemetry& fixes = pass.star_tracker;

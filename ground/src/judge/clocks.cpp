@@ -143,7 +143,7 @@ void forbid_late_gyros(std::vector<Finding>& findings, std::size_t before, doubl
     findings[i].text +=
         " The clock of the star tracker agrees with neither of the two: which gyro is stamped wrongly, the "
         "pass does not tell.";
-    findings[i].evidence += fmt::format("; fixes hold the attitude {} after their stamp", offset_text(offset_s));
+    findings[i].evidence += fmt::format("; fixes were taken {} after their stamp", offset_text(offset_s));
     findings[i].cure = "Find out which of the three clocks is right before any is corrected. " + findings[i].cure;
   }
 }
@@ -160,7 +160,7 @@ void judge_step(const Pass& pass, const ClockStep& step, Finding::Severity sever
       fmt::format("Between {} and {} min the clock of {} is off by another amount than over the rest of the pass{}.",
                   minutes(step.from), minutes(step.until), whose, what_of_it),
       fmt::format("there {} later than over the rest, by {}",
-                  of_star_tracker ? "fixes hold the attitude" : "its stamps are", size),
+                  of_star_tracker ? "fixes were taken" : "its stamps are", size),
       fmt::format(
           "Add {:+.4f} s to the stamps of {} there, or cut the pass there and calibrate on the parts apart; look "
           "for what happened to its clock.",
@@ -174,7 +174,7 @@ void tell_correction(const PassSettings& settings, const ClockCorrection& correc
     const double change_s = correction.rate_s_s * to_seconds(settings.duration);
     add(findings, FindingCode::kClockOffsetFound, Finding::Severity::kNote,
         "The stamps of the star tracker were corrected by what the calibration in use found of its clock.",
-        fmt::format("fixes hold the attitude {} after their stamp at the epoch of this pass; over the pass that "
+        fmt::format("fixes were taken {} after their stamp at the epoch of this pass; over the pass that "
                     "changes by {}",
                     offset_text(correction.offset_s), offset_text(change_s)),
         kCure);
@@ -215,7 +215,7 @@ void judge_further_star_trackers(const std::vector<Measured>& apart_s, std::vect
           fmt::format("The stamps of star tracker {} are off those of the first; the calibration takes the clocks of "
                       "both for one.",
                       i + 2),
-          fmt::format("its fixes hold the attitude later after their stamp, by {:+.2f} ± {:.2f} ms", 1e3 * its_s,
+          fmt::format("its fixes were taken later after their stamp, by {:+.2f} ± {:.2f} ms", 1e3 * its_s,
                       1e3 * apart_s[i].sigma),
           fmt::format("Add {:+.4f} s to the stamps of star tracker {}, or correct those of the first.", its_s, i + 2));
     }
@@ -267,7 +267,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
                                 "taken account of it. {}",
                                 kWhichClock)
                   : "The clock of the star tracker is off that of the gyros; the calibration has taken account of it.",
-        fmt::format("fixes hold the attitude {} after their stamp", offset_text(offset_s)), cure);
+        fmt::format("fixes were taken {} after their stamp", offset_text(offset_s)), cure);
   }
   if (rate != 0) {
     add(findings, FindingCode::kClockRateFound, severity,
@@ -306,7 +306,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
             "The stamps of the star tracker are far off those of the gyros, and by the settings nothing was done "
             "about it. {}",
             kWhichClock),
-        fmt::format("fixes hold the attitude {} after their stamp", offset_text(middle.value)),
+        fmt::format("fixes were taken {} after their stamp", offset_text(middle.value)),
         cure_of_star_tracker(pass.settings, middle.value, 0));
   }
 }
@@ -340,7 +340,7 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
         fmt::format("The stamps of the star tracker are off those of the gyros{}, which is in the attitude. {}",
                     corrected ? kAfterCorrection : "", kWhichClock),
         fmt::format(
-            "fixes hold the attitude {} after their stamp in the middle of the pass; over the pass that changes "
+            "fixes were taken {} after their stamp in the middle of the pass; over the pass that changes "
             "by {}{}",
             offset_text(middle.value), offset_text(change_s),
             turned_sigmas > kSeenTurned

@@ -81,7 +81,7 @@ constexpr AtOrbitalPeriod kErrorAtOrbitalPeriod = {
     FurtherState::kOrbitalError,
     FindingCode::kOrbitalErrorFound,
     "The star tracker has an error at orbital period; the calibration has taken account of it.",
-    "Look for what warms its mounting.",
+    "Look for what changes the temperature of its mounting with the orbit.",
     "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and it was taken "
     "for an error of the star tracker. Sigmas do not tell of drift.",
     "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic field. Where "

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <variant>
 
@@ -82,6 +83,21 @@ struct Pipeline::Program {
     return visit([&](const auto& its) { return with_room<Gyros>(its.estimator().gyros(), layout); });
   }
 };
+
+std::unique_ptr<InvariantEstimator<kPairCapacity>> pair_estimator(const PassSettings& settings,
+                                                                  const CalibrationOptions& options) {
+  const CalibrationSetup setup = setup_of(settings, options);
+  if (!(setup.layout == Layout{})) {
+    throw std::invalid_argument("pair_estimator: not two gyros with eq. (1) alone");
+  }
+  const Prior prior = prior_of(settings, setup.layout);
+  auto estimator = std::make_unique<InvariantEstimator<kPairCapacity>>();
+  using PairGyros = InvariantEstimator<kPairCapacity>::Gyros;
+  if (const auto fault = estimator->set_up(setup, with_room<PairGyros>(prior.gyros, setup.layout), prior.covariance)) {
+    throw error_of(*fault);
+  }
+  return estimator;
+}
 
 Pipeline::Pipeline(const PassSettings& settings, const CalibrationOptions& options, Steps steps, bool navigate)
     : settings_(settings), options_(options), policy_(policy_of(options.corrections)) {

@@ -12,11 +12,11 @@
 
 namespace trihedron::campaign {
 
-/// What has happened to a worker, which is a process that performs one run at a time.
+/// What has happened to a worker, which is a process that performs the runs that it is given, one at a time or together.
 struct WorkerEvent {
   enum class Kind : std::uint8_t {
     kReady,      ///< it is there and has nothing to do
-    kPerformed,  ///< it has performed the run that it was given, and has nothing to do
+    kPerformed,  ///< it has performed a run; after the last one that it was given it has nothing to do
     kEnded       ///< it is no more; a worker that takes its place begins with kReady
   };
   std::uint64_t worker = 0;
@@ -33,8 +33,8 @@ class Workers {
   Workers& operator=(const Workers&) = delete;
   virtual ~Workers() = default;
 
-  /// worker: has nothing to do.
-  virtual void give(std::uint64_t worker, std::uint64_t run) = 0;
+  /// worker: has nothing to do. runs: one at least.
+  virtual void give(std::uint64_t worker, std::span<const std::uint64_t> runs) = 0;
   /// Waits until something happens. Throws Stopped, and whatever ends the campaign.
   virtual std::vector<WorkerEvent> wait() = 0;
 };
@@ -42,8 +42,9 @@ class Workers {
 /// Processes that one run may end before it counts as failed.
 inline constexpr int kProcessesForARun = 2;
 
-/// Gives runs to workers one by one, as they have nothing to do, and hands over what has come, in no order. A run whose
-/// worker ends is given to another; the second time it has failed. Throws what `workers` and `collect` throw, and
+/// Gives runs to workers as they have nothing to do, as many as are best performed together, and hands over what has come,
+/// in no order. Runs whose worker ends are given to others, each by itself; a run whose worker ends a second time has
+/// failed. Throws what `workers` and `collect` throw, and
 /// std::logic_error where a worker gives a record of another run than it was given.
 void distribute(const CampaignPlan& plan, std::span<const std::uint64_t> runs, Workers& workers,
                 const Collect& collect);

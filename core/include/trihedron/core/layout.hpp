@@ -16,7 +16,7 @@ inline constexpr int kMaxStarTrackers = 4;
 /// The kinds of states that may be estimated in addition to directions, drift coefficients and alignments, in the order
 /// of calibration.json.
 enum class FurtherState : std::uint8_t {
-  kClockOffset,           ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
+  kClockOffset,           ///< τ of the star trackers: a fix stamped t gives the attitude at t + τ
   kClockRate,             ///< of the star trackers: τ grows by so many seconds per second
   kOrbitalError,          ///< of each star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
   kStarTrackerAlignment,  ///< of the star trackers other than the first; always there for those of the layout

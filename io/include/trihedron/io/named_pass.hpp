@@ -34,8 +34,10 @@ enum class TruthUse {
   kToCompare,  ///< a defect of the pass, which then has no truth
 };
 
-/// Throws as read_pass and, where the truth is needed, as read_truth.
-[[nodiscard]] NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use = TruthUse::kNeeded);
+/// Throws as read_pass and, where the truth is needed, as read_truth. The truth is that between the two ends of the
+/// selection.
+[[nodiscard]] NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use = TruthUse::kNeeded,
+                                        const Selection& selection = {});
 
 /// In the order of their epochs, with names that differ from each other and from the `reserved`, their truth to
 /// compare. Throws as read_pass.

@@ -100,6 +100,7 @@ struct LoadedPass {
   /// Files that were read besides `path` and what is in it: those that a telemetry.toml names.
   std::vector<std::filesystem::path> sources{};
   ColumnsRead columns{};
+  Duration epoch_moved{};  ///< from that of the files to that of the selection
 };
 
 /// Reads a pass and screens its telemetry: a directory, a NetCDF-4 file, or a telemetry.toml (docs/telemetry.md).

@@ -72,12 +72,12 @@ struct DriftFieldLevel {
   double sigma_factor = 1;  ///< its 1-sigma: from rms/factor to rms · factor
 };
 
-/// The drift model that an estimator on board takes of a drift field.
+/// The drift model with which an estimator on board is to fly where the calibration found a drift field.
 struct OnBoardDrift {
   DriftModelId drift_model;
-  /// Stands for what its coefficients and the alignments cannot make up for of all others, beside the noise of the
-  /// calibration, per axis across each momentum; 0 where that noise has it, as after an earlier calibration with a
-  /// field.
+  /// Random walk of each momentum, per axis across it, that stands for the drift which this model leaves out and which
+  /// neither its coefficients nor the alignments can take up. To be added to the noise of the calibration; 0 where that
+  /// noise contains it already, as after an earlier calibration with a field.
   double random_walk_rad_sqrt_s = 0;
 };
 

@@ -182,6 +182,12 @@ inline constexpr std::array<RunQuantityRow, kRunQuantities> kRunQuantityRows = {
   return 0;
 }
 
+/// What a run of a campaign does with what it has simulated.
+enum class CampaignWork : std::uint8_t {
+  kCalibrate,  ///< all that `calibrate` does, with verdict, navigator and open loops
+  kFilter,     ///< the filter alone: coefficients, alignments and the attitude at each fix, compared with the truth
+};
+
 /// What a campaign does, apart from its base scenario and the settings of the calibration.
 struct CampaignPlan {
   std::string name;
@@ -189,6 +195,7 @@ struct CampaignPlan {
   std::uint64_t runs = 0;     ///< flights × points of the grids over settings
   std::uint64_t repeats = 1;  ///< runs at each point of a grid
   bool latin_hypercube = false;
+  CampaignWork work = CampaignWork::kCalibrate;
   double limit_rad = 5 * kArcminute;  ///< attitude error that ends a correction interval
   bool keeps_covariance = false;      ///< RunQuantity::kCovariance, which is larger than all others together
   std::vector<CampaignInput> inputs;
@@ -196,7 +203,8 @@ struct CampaignPlan {
 
   /// Whether its runs have this quantity.
   [[nodiscard]] bool has(RunQuantity quantity) const {
-    return keeps_covariance || quantity != RunQuantity::kCovariance;
+    return (keeps_covariance || quantity != RunQuantity::kCovariance) &&
+           (work == CampaignWork::kCalibrate || quantity <= RunQuantity::kAttitudeNormalisedSquare);
   }
 };
 

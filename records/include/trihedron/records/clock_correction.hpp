@@ -5,7 +5,7 @@
 
 namespace trihedron {
 
-/// A fix stamped t holds the attitude at t + offset + rate (t − epoch); a reading of gyro k stamped t holds the
+/// A fix stamped t gives the attitude at t + offset + rate (t − epoch); a reading of gyro k stamped t gives the
 /// direction at t − late[k].
 struct ClockCorrection {
   double offset_s = 0;

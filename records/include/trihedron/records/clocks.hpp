@@ -21,7 +21,7 @@ struct Measured {
 
 /// A clock that is off by more over a part of the pass than over the rest, which holds the end of the pass.
 struct ClockStep {
-  int gyro = -1;  ///< whose stamps are later; −1: fixes hold the attitude later after their stamps
+  int gyro = -1;  ///< whose stamps are later; −1: fixes were taken later after their stamps
   Time from{};    ///< fixes with stamps from here on …
   Time until{};   ///< … and before
   Measured change_s;

@@ -86,8 +86,8 @@ struct CalibrationOptions {
   /// Without a usable fix for longer than this the angles between the momenta are used alone; Duration::max(): never.
   /// Of estimator invariant.
   Duration angles_after = std::chrono::minutes(1);
-  /// Whether the sigmas are widened where the innovations are correlated in time, by a filter that knows only what came
-  /// before. What calibrates a whole pass looks for what changes over it by itself.
+  /// Whether a causal filter (on board, `navigate --online`) widens its sigmas where its innovations are correlated in
+  /// time. `calibrate`, which has the whole pass, finds what changes during it and does not need this.
   bool widen_where_correlated = false;
   FurtherStateOptions further_states;
   CorrectionOptions corrections;

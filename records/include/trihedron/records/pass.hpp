@@ -45,7 +45,7 @@ struct PassSettings {
   Duration gyro_period{};
   Duration star_tracker_period{};
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
-  /// A fix is stamped t in the telemetry where it holds the attitude at t + offset + rate (t − epoch). Stamps of a pass
+  /// A fix is stamped t in the telemetry where it gives the attitude at t + offset + rate (t − epoch). Stamps of a pass
   /// in memory are mended by it already.
   double star_tracker_clock_offset_s = 0;
   double star_tracker_clock_rate_s_s = 0;
@@ -132,7 +132,7 @@ struct Truth {
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
   struct StarTracker {
-    double clock_offset_s = 0;  ///< a fix stamped t holds the attitude at t + offset + rate (t − epoch)
+    double clock_offset_s = 0;  ///< a fix stamped t gives the attitude at t + offset + rate (t − epoch)
     double clock_rate_s_s = 0;
     Eigen::Vector3d orbital_sine_rad{0, 0, 0};  ///< of the error p_s sin nt + p_c cos nt, head axes
     Eigen::Vector3d orbital_cosine_rad{0, 0, 0};

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "trihedron/core/frames.hpp"
@@ -64,6 +66,11 @@ class SmoothNoise {
 
   [[nodiscard]] Eigen::Vector3d at(double t_s) const;
 
+  [[nodiscard]] double begin_s() const { return begin_s_; }
+  [[nodiscard]] double knots_per_s() const { return knots_per_s_; }
+  /// Of the B-spline, as many as there are knots.
+  [[nodiscard]] const std::vector<Eigen::Vector3d>& coefficients() const { return coefficients_; }
+
  private:
   double begin_s_;
   double knots_per_s_;
@@ -81,6 +88,9 @@ class AttitudeSpline {
   [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
   [[nodiscard]] double begin_s() const { return t_s_.front(); }
   [[nodiscard]] double end_s() const { return t_s_.back(); }
+  /// At the samples: x, y, z, w, and their second derivatives, 1/s².
+  [[nodiscard]] const std::vector<Eigen::Vector4d>& values() const { return q_; }
+  [[nodiscard]] const std::vector<Eigen::Vector4d>& second_derivatives() const { return q_second_; }
 
  private:
   std::vector<double> t_s_;
@@ -95,14 +105,23 @@ class AttitudeProgramme {
   /// not cover begin_s … end_s up to 0.2 s.
   AttitudeProgramme(const AttitudeScenario& scenario, const Ephemeris& ephemeris, std::uint64_t seed, double begin_s,
                     double end_s);
+  /// The same with the reference attitude of another, of the same orbit and time.
+  AttitudeProgramme(const AttitudeScenario& scenario, std::shared_ptr<const AttitudeSpline> reference,
+                    std::uint64_t seed, double begin_s, double end_s);
 
   /// C_in_c.
   [[nodiscard]] Rot<In, C> at(double t_s) const;
   /// Angular velocity of c relative to in, rad/s.
   [[nodiscard]] Vec<C> rate(double t_s) const;
 
+  // What it is made of.
+  [[nodiscard]] const std::shared_ptr<const AttitudeSpline>& reference() const { return reference_; }
+  [[nodiscard]] const SlewPlan& slews() const { return slews_; }
+  [[nodiscard]] const std::optional<SmoothNoise>& jitter() const { return jitter_; }
+  [[nodiscard]] double jitter_rad() const { return jitter_rad_; }  ///< 1-sigma about each axis
+
  private:
-  AttitudeSpline reference_;
+  std::shared_ptr<const AttitudeSpline> reference_;
   SlewPlan slews_;
   double jitter_rad_;
   std::optional<SmoothNoise> jitter_;

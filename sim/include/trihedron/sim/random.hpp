@@ -5,8 +5,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <span>
 
 namespace trihedron::sim {
 
@@ -75,24 +77,40 @@ class Stream {
   [[nodiscard]] double uniform(double low, double high) { return low + (high - low) * uniform(); }
   [[nodiscard]] bool happens(double probability) { return uniform() < probability; }
 
+  /// A point in the unit circle, uniform over its area, and its squared distance from the centre, above 0.
+  struct InCircle {
+    double x = 0;
+    double y = 0;
+    double square = 0;
+  };
+  [[nodiscard]] InCircle in_circle() {
+    InCircle point;
+    fill({&point, 1});
+    return point;
+  }
+  /// As many of them. A processor cannot foresee which points lie in the circle: each is put where the next one
+  /// belongs, and stays where it does.
+  void fill(std::span<InCircle> points) {
+    for (std::size_t found = 0; found < points.size();) {
+      InCircle& point = points[found];
+      point.x = uniform(-1, 1);
+      point.y = uniform(-1, 1);
+      point.square = point.x * point.x + point.y * point.y;
+      found += static_cast<std::size_t>(static_cast<int>(point.square < 1) & static_cast<int>(point.square > 0));
+    }
+  }
+
   /// Standard normal: Marsaglia's polar method, which gives them in pairs.
   [[nodiscard]] double normal() {
     if (spare_ready_) {
       spare_ready_ = false;
       return spare_;
     }
-    double x = 0;
-    double y = 0;
-    double s = 0;
-    do {
-      x = uniform(-1, 1);
-      y = uniform(-1, 1);
-      s = x * x + y * y;
-    } while (!(s < 1 && s > 0));
-    const double factor = std::sqrt(-2 * std::log(s) / s);
-    spare_ = y * factor;
+    const InCircle point = in_circle();
+    const double factor = std::sqrt(-2 * std::log(point.square) / point.square);
+    spare_ = point.y * factor;
     spare_ready_ = true;
-    return x * factor;
+    return point.x * factor;
   }
 
   /// Three independent standard normals.

@@ -24,6 +24,13 @@ struct SimulatedPass {
 /// that makes no sense, naming the field.
 [[nodiscard]] SimulatedPass simulate(const Scenario& scenario);
 
+/// What the pass.toml of such a pass says.
+[[nodiscard]] PassSettings settings_of(const Scenario& scenario);
+
+/// How far beyond both ends of the pass simulate() has to know the attitude, s: fixes look at C(t + offset), and their
+/// rate a little to both sides; readings at C(t − latency).
+[[nodiscard]] double margin_s(const Scenario& scenario);
+
 /// What simulate() asks of the numbers of a scenario, without its work. Throws as that.
 void expect_possible(const Scenario& scenario);
 

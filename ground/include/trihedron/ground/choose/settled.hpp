@@ -12,7 +12,11 @@ namespace trihedron::ground {
 /// drift_on_board(). Throws SetupError.
 [[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
-/// The same for what is flown event by event. Where the navigator takes over the estimates, their sigmas are widened
+/// For a Pipeline as well, but what the options leave open is left out: eq. (1) alone, the noise of the settings, no
+/// further states.
+[[nodiscard]] CalibrationOptions settled_as_told(CalibrationOptions options);
+
+/// As settled_before() for what is flown event by event. Where the navigator takes over the estimates, their sigmas are widened
 /// where the innovations are correlated in time.
 [[nodiscard]] CalibrationOptions settled_for_flight(const PassSettings& settings, const CalibrationOptions& options);
 

@@ -33,7 +33,7 @@ struct Mistake {
     kQuaternion,      ///< order, signs or direction of the fixes' quaternions: `components` are the right x, y, z, w
     kGyroAxes,        ///< of `gyro`: `components` are the right x, y, z
     kGyrosExchanged,  ///< each of the first two gyros has the readings of the other
-    kClock,           ///< the fixes hold the attitude `offset_s` after their stamp
+    kClock,           ///< the fixes were taken `offset_s` after their stamp
     kNothingTried,    ///< the fixes are not of these gyros, or something else is wrong with them
   };
   Kind kind{};

@@ -1,0 +1,2 @@
+#define TRIHEDRON_LANES_PROCESSOR any_processor
+#include "kernels_impl.hpp"

@@ -1,0 +1,2 @@
+#define TRIHEDRON_LANES_PROCESSOR avx2
+#include "kernels_impl.hpp"
