@@ -14,6 +14,7 @@
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/residuals.hpp"
+#include "trihedron/lanes/filter_flight.hpp"
 #include "trihedron/report/report.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -118,6 +119,23 @@ Run calibration(Estimator estimator, bool told, bool definitive = false) {
   return [&pass, options] { static_cast<void>(ground::calibrate(pass, options)); };
 }
 
+/// So many flights of the filter alone, simulated, filtered and compared with the truth: side by side, or a single one
+/// by the on-board step.
+Run filter_flights(std::size_t flights) {
+  std::vector<lanes::FilterFlight> its(flights);
+  for (std::size_t i = 0; i < flights; ++i) {
+    its[i].scenario = scenario_of(9);
+    its[i].scenario.seed = i + 1;
+  }
+  return [its] {
+    if (its.size() == 1) {
+      static_cast<void>(lanes::fly_alone(its.front()));
+    } else {
+      static_cast<void>(lanes::fly(its));
+    }
+  };
+}
+
 /// What `calibrate` writes besides the report.
 Run writing(std::shared_ptr<const CalibrationRun> run) {
   return [run] {
@@ -212,6 +230,8 @@ const std::vector<Part>& parts() {
       {"batch, all told", [] { return calibration(Estimator::kBatch, true); }},
       {"batch, all told, definitive attitude", [] { return calibration(Estimator::kBatch, true, true); }},
       {"batch", [] { return calibration(Estimator::kBatch, false); }},
+      {"flight of the filter alone", [] { return filter_flights(1); }},
+      {"eight of them side by side", [] { return filter_flights(lanes::kTogether); }},
       {"report", rendering},
       {"write results", [] { return writing(calibrated()); }},
   };

@@ -1,6 +1,6 @@
 # One way to make a module, so that the dependency directions cannot be got wrong by accident.
 #
-#   cli → report, plan → ground, sim; io → records → core; python → ground, sim, io
+#   cli → campaign, report, plan; campaign → lanes → ground, sim; io → records → core; python → ground, sim, io
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.

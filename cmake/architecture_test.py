@@ -110,7 +110,7 @@ def assert_acyclic(table):
 
 def test_table_is_read_and_acyclic():
     table = allowed()
-    assert {"core", "records", "sim", "io", "ground", "plan", "campaign", "report", "cli", "python"} == set(table)
+    assert {"core", "records", "sim", "io", "ground", "plan", "lanes", "campaign", "report", "cli", "python"} == set(table)
     assert table["core"] == set()
     assert_acyclic(table)
 

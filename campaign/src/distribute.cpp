@@ -98,7 +98,7 @@ class Assignments {
   std::deque<std::uint64_t> again_;  ///< those whose worker has ended
   std::deque<std::uint64_t> idle_;
   std::map<std::uint64_t, std::vector<std::uint64_t>> performed_by_;  ///< runs, by their workers
-  std::map<std::uint64_t, int> lost_;                    ///< processes that a run has ended
+  std::map<std::uint64_t, int> lost_;                                 ///< processes that a run has ended
   std::size_t left_;
 };
 

@@ -320,7 +320,8 @@ RunRecord unless_it_fails(const CampaignPlan& plan, std::uint64_t run, const Wor
 }
 
 /// That of a run, or the record of one whose draws make none.
-std::variant<RunSetup, RunRecord> setup_or_failure(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of) {
+std::variant<RunSetup, RunRecord> setup_or_failure(const CampaignPlan& plan, std::uint64_t run,
+                                                   const SetupOf& setup_of) {
   try {
     return setup_of(seed_of_run(plan, run), draws_of_run(plan, run));
   } catch (const std::invalid_argument& error) {
@@ -378,8 +379,8 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& se
     record = unless_it_fails(plan, run, [&] {
       Flight flight = fly(std::get<RunSetup>(setup), plan.limit_rad,
                           flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
-      RunRecord its = plan.work == CampaignWork::kFilter ? fly_filters(plan, {&run, 1}, setup_of).front()
-                                                         : record_of(flight, plan);
+      RunRecord its =
+          plan.work == CampaignWork::kFilter ? fly_filters(plan, {&run, 1}, setup_of).front() : record_of(flight, plan);
       if (flown) {
         flown(std::move(flight));
       }

@@ -104,8 +104,9 @@ TEST(Distribute, GivesRunsThatWereTogetherWithOneThatEndsItsProcessAlone) {
   std::uint64_t next = 10;
   Fake workers({ready(0)}, [&](std::uint64_t worker, std::uint64_t run) -> std::vector<WorkerEvent> {
     if (worker == 0) {  // the third of those given ends it
-      return run < 2 ? std::vector{performed(worker, run)}
-                     : run == 2 ? std::vector{ended(worker), ready(++next)} : std::vector<WorkerEvent>{};
+      return run < 2    ? std::vector{performed(worker, run)}
+             : run == 2 ? std::vector{ended(worker), ready(++next)}
+                        : std::vector<WorkerEvent>{};
     }
     return run == 2 ? std::vector{ended(worker), ready(++next)} : std::vector{performed(worker, run)};
   });

@@ -279,7 +279,8 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command
       ->add_option(
           "--drift-model", arguments->drift_model,
-          "Drift model. auto: the one that the pass gives evidence of; field: all members of the drift field, each degree "
+          "Drift model. auto: the one that the pass gives evidence of; field: all members of the drift field, each "
+          "degree "
           "as large as the pass shows, of estimator batch alone. Unless the settings say otherwise auto, of estimator "
           "batch field")
       ->check([](const std::string& name) {

@@ -32,8 +32,8 @@ namespace {
 /// processor for those who look.
 constexpr std::chrono::milliseconds kPatience(2);
 
-// Rank 0 says kSayBegin, then "WORKER RUN …", at last kSayEnd, or kSayLeave where a rank is lost; the others "WORKER said
-// LINE" and "WORKER ended HOW"; all kSayAlive.
+// Rank 0 says kSayBegin, then "WORKER RUN …", at last kSayEnd, or kSayLeave where a rank is lost; the others "WORKER
+// said LINE" and "WORKER ended HOW"; all kSayAlive.
 constexpr std::string_view kSayBegin = "begin";
 constexpr std::string_view kSayEnd = "end";
 constexpr std::string_view kSayLeave = "leave";

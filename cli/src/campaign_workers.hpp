@@ -12,8 +12,9 @@
 
 namespace trihedron::cli {
 
-/// Performs the runs whose numbers come on standard input, those on a line together, and prints the digest of the campaign
-/// and then the record of each as a line, up to the end of the input. Throws UsageError for what is no number of a run.
+/// Performs the runs whose numbers come on standard input, those on a line together, and prints the digest of the
+/// campaign and then the record of each as a line, up to the end of the input. Throws UsageError for what is no number
+/// of a run.
 void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const campaign::SetupOf& setup_of);
 
 /// The job that this process is a rank of. Its end waits for the other ranks, unless this process has been stopped, as

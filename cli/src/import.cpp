@@ -143,8 +143,7 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
   if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
     throw io::UsageError("--pass and --epoch are for an attitude; the epoch of a pass is in its own files");
   }
-  const io::NamedPass named =
-      io::read_named_pass(arguments.file, io::TruthUse::kToCompare, selection_of(arguments));
+  const io::NamedPass named = io::read_named_pass(arguments.file, io::TruthUse::kToCompare, selection_of(arguments));
   const io::LoadedPass& loaded = named.loaded;
   log_pass(common.log, arguments.file, loaded);
   std::vector<std::filesystem::path> inputs = {arguments.file};

@@ -33,7 +33,8 @@ class WorkerProcesses {
   WorkerProcesses& operator=(const WorkerProcesses&) = delete;
   ~WorkerProcesses();
 
-  /// worker: one that has said a line for each run that it was given before. What is given to one that has ended is lost.
+  /// worker: one that has said a line for each run that it was given before. What is given to one that has ended is
+  /// lost.
   void give(std::uint64_t worker, std::span<const std::uint64_t> runs);
   /// What has come; waits for it at most `patience`. Throws MachineFailed where a process ends by itself before its
   /// first line, or the third in turn is killed before it, since the next would end the same way; Stopped where this

@@ -404,7 +404,7 @@ def with_key(line):
     (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
     (CAMPAIGN.replace("seed = 5", 'covariance = "yes"'), ["c.toml:5:", "kept"]),
-    (CAMPAIGN.replace("seed = 5", 'work = "filtre"'), ["c.toml:5:", "calibrate", "filter"]),
+    (CAMPAIGN.replace("seed = 5", 'work = "filtre"'), ["c.toml:5:", "did you mean \"filter\""]),
     (FILTERS + '[calibration]\nestimator = "batch"\n', ["batch is no filter", "invariant"]),
     (FILTERS + 'calibration.estimator = {grid = ["invariant", "batch"]}\n', ["c.toml:14:", "batch is no filter", "can be drawn"]),
     (CAMPAIGN.replace("repeats = 2", "repeat = 2"), ["c.toml:4:", "did you mean \"repeats\""]),

@@ -63,7 +63,8 @@ Field estimator(CalibrationOptions& options) {
 Field drift_model(CalibrationOptions& options) {
   const auto schema = [] { return Json{{"enum", drift_model_words()}}; };
   return {"drift_model",
-          "auto: the one that the pass gives evidence of; field: all members of the drift field, each degree as large as the pass shows",
+          "auto: the one that the pass gives evidence of; field: all members of the drift field, each degree as large "
+          "as the pass shows",
           schema, [&options](const TomlTable& table, const toml::node& node) {
             const std::string name = table.text(node, "drift_model");
             if (!set_drift_model(name, options)) {

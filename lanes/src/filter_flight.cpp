@@ -103,7 +103,8 @@ FilterResult fly_alone(const FilterFlight& flight) {
     if (fix.status == FixStatus::kNone || fix.status == FixStatus::kPending) {
       return;
     }
-    const bool is_judged = fix.status == FixStatus::kRejectedByGate || (fix.used() && fix.status != FixStatus::kStarted);
+    const bool is_judged =
+        fix.status == FixStatus::kRejectedByGate || (fix.used() && fix.status != FixStatus::kStarted);
     result.fixes_judged += is_judged ? 1 : 0;
     result.nis_sum_of_judged += is_judged ? fix.nis : 0;
     result.fixes_used += fix.status == FixStatus::kUsed ? 1 : 0;
@@ -151,8 +152,12 @@ std::vector<FilterOutcome> fly(std::span<const FilterFlight> flights) {
     try {
       sim::expect_possible(flights[i].scenario);
       if (goes_in_lanes(flights[i])) {
-        const Lane* before = waiting.empty() ? nullptr : waiting.back().second.get();
-        waiting.emplace_back(i, std::make_unique<Lane>(flights[i], before));
+        const auto before = std::ranges::find_if(
+            waiting, [&](const auto& its) { return its.second->has_reference_of(flights[i].scenario); });
+        auto lane = std::make_unique<Lane>(flights[i], before != waiting.end() ? before->second.get() : nullptr);
+        if (lane->turns_by_little()) {
+          waiting.emplace_back(i, std::move(lane));
+        }
       }
     } catch (const std::invalid_argument&) {
       // As by itself, which then says why.

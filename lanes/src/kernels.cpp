@@ -4,7 +4,8 @@ namespace trihedron::lanes {
 
 const Kernels& kernels() {
 #ifdef __x86_64__
-  if (static_cast<int>(__builtin_cpu_supports("avx512f")) != 0 && static_cast<int>(__builtin_cpu_supports("avx512dq")) != 0 &&
+  if (static_cast<int>(__builtin_cpu_supports("avx512f")) != 0 &&
+      static_cast<int>(__builtin_cpu_supports("avx512dq")) != 0 &&
       static_cast<int>(__builtin_cpu_supports("avx512vl")) != 0) {
     return avx512::kKernels;
   }

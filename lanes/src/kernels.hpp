@@ -1,6 +1,6 @@
 #pragma once
-/// The functions that carry eight flights at once, compiled for several kinds of processor. Each flight is rounded as it
-/// would be alone, on each of them, whatever the others do.
+/// The functions that carry eight flights at once, compiled for several kinds of processor. Each flight is rounded as
+/// it would be alone, on each of them, whatever the others do.
 
 #include "state.hpp"
 

@@ -84,11 +84,10 @@ TRIHEDRON_INLINE V3 rotated(const V3& v, const V3& turn) {
   const V3 once = cross(turn, v);
   return v + a * once + b * cross(turn, once);
 }
-/// The same of a turn by less than 1e-3 rad, as in a step.
+/// The same of a turn by less than kLittle_rad, as in a step: what is left out is below rounding.
 TRIHEDRON_INLINE V3 rotated_by_little(const V3& v, const V3& turn) {
-  const V angle2 = dot(turn, turn);
   const V3 once = cross(turn, v);
-  return v + (1 - angle2 * (1.0 / 6)) * once + (0.5 - angle2 * (1.0 / 24)) * cross(turn, once);
+  return v + once + all(0.5) * cross(turn, once);
 }
 /// The rotation vector of a rotation by little: exact to rounding up to 0.02 rad.
 TRIHEDRON_INLINE V3 rotation_vector(const M3& m) {
@@ -106,12 +105,27 @@ TRIHEDRON_INLINE Quaternion operator*(const Quaternion& a, const Quaternion& b) 
 
 /// Of half a rotation vector of up to a right angle: Taylor's series to rounding.
 TRIHEDRON_INLINE Quaternion turn_of_half(const V3& half) {
-  const V x = dot(half, half);
-  V sinc = all(1);
-  V cosine = all(1);
-  for (int n = 22; n > 0; n -= 2) {
-    sinc = 1 - x * (1.0 / (n * (n + 1))) * sinc;
-    cosine = 1 - x * (1.0 / (n * (n - 1))) * cosine;
+  // Of cos and of sin x / x: those of each power of −x².
+  constexpr double kCosine[] = {1.0,
+                                0x1p-1,
+                                1.0 / 24,
+                                1.0 / 720,
+                                1.0 / 40320,
+                                1.0 / 3628800,
+                                1.0 / 479001600,
+                                1.0 / 87178291200,
+                                1.0 / 20922789888000,
+                                1.0 / 6402373705728000,
+                                1.0 / 2432902008176640000,
+                                1.0 / 1.12400072777760768e21};
+  constexpr int kLast = 11;
+  const V x = V{} - dot(half, half);
+  V cosine = all(kCosine[kLast]);
+  V sinc = all(kCosine[kLast] / (2 * kLast + 1));
+#pragma GCC unroll 16
+  for (int i = kLast - 1; i >= 0; --i) {
+    cosine = kCosine[i] + x * cosine;
+    sinc = kCosine[i] / (2 * i + 1) + x * sinc;
   }
   return {sinc * half, cosine};
 }
@@ -152,8 +166,9 @@ TRIHEDRON_INLINE V3 jitter_at(const Attitude& its, double t_s) {
   const double u2 = u * u;
   const double v2 = v * v;
   const auto inner = [](double x) { return 1 + x * (5 + x * (10 + x * (10 + x * (5 - 5 * x)))); };
-  const double w[6] = {v2 * v2 * v, inner(v), 66 + u2 * (-60 + u2 * (30 - 10 * u)), 66 + v2 * (-60 + v2 * (30 - 10 * v)),
-                       inner(u),    u2 * u2 * u};
+  const double w[6] = {
+      v2 * v2 * v, inner(v),   66 + u2 * (-60 + u2 * (30 - 10 * u)), 66 + v2 * (-60 + v2 * (30 - 10 * v)),
+      inner(u),    u2 * u2 * u};
   V3 sum = zero3();
   for (int k = 0; k < 6; ++k) {
     sum = sum + all(w[k] / 120) * its.jitter[i + k];
@@ -162,7 +177,7 @@ TRIHEDRON_INLINE V3 jitter_at(const Attitude& its, double t_s) {
 }
 
 void attitude(const Attitude& its, double t_s, M3& C_in_c) {
-  const V since = (t_s - its.turn_begin_s) / its.turn_duration_s;
+  const V since = (t_s - its.turn_begin_s) * its.turns_per_s;
   const V u = smaller(larger(since, V{}), all(1));
   const V s = u * u * u * (10 + u * (6 * u - 15));
   Quaternion q = reference_at(its, t_s) * (its.turn_from * turn_of_half(0.5 * s * its.turn_rad));
@@ -193,21 +208,36 @@ TRIHEDRON_INLINE V3 drift_rate(const V3& h, const V (&kappa)[kCoefficients]) {
           h.z * (k[0] * (sum4 - s.z) + k[3] * s.x - k[2] * s.y) + k[4] * h.x * h.y};
 }
 
-/// sim::precess().
+/// sim::precess(), stage by stage of both gyros, neither of which waits for the other.
 void turn_momenta(TrueGyro (&gyros)[kGyros], double step_s, const M3& middle, const M3& end) {
-  for (TrueGyro& its : gyros) {
-    const M3 middle_b = middle * its.C_c_b;
-    const M3 end_b = end * its.C_c_b;
-    const auto turn = [&](const M3& C, const V3& h_b) { return all(step_s) * (C * drift_rate(h_b, its.kappa_rad_s)); };
-    const auto turn_at = [&](const M3& C, const V3& h) { return turn(C, transposed_times(C, h)); };
-    const V3& h = its.h_in;
-    const V3 k1 = turn(its.C_in_b, its.h_b);
-    const V3 k2 = turn_at(middle_b, rotated_by_little(h, all(0.5) * k1));
-    const V3 k3 = turn_at(middle_b, rotated_by_little(h, all(0.5) * k2 - all(0.125) * cross(k1, k2)));
-    const V3 k4 = turn_at(end_b, rotated_by_little(h, k3));
-    its.h_in = rotated_by_little(h, all(1.0 / 6) * (k1 + all(2) * (k2 + k3) + k4 - all(0.5) * cross(k1, k4)));
-    its.C_in_b = end_b;
-    its.h_b = transposed_times(end_b, its.h_in);
+  M3 middle_b[kGyros];
+  M3 end_b[kGyros];
+  V3 h[kGyros];
+  V3 k1[kGyros];
+  V3 k2[kGyros];
+  V3 k3[kGyros];
+  const auto turn = [&](int k, const M3& C, const V3& h_b) {
+    return all(step_s) * (C * drift_rate(h_b, gyros[k].kappa_rad_s));
+  };
+  const auto turn_at = [&](int k, const M3& C, const V3& its_h) { return turn(k, C, transposed_times(C, its_h)); };
+  for (int k = 0; k < kGyros; ++k) {
+    middle_b[k] = middle * gyros[k].C_c_b;
+    h[k] = gyros[k].h_in;
+    k1[k] = turn(k, gyros[k].C_in_b, gyros[k].h_b);
+  }
+  for (int k = 0; k < kGyros; ++k) {
+    k2[k] = turn_at(k, middle_b[k], rotated_by_little(h[k], all(0.5) * k1[k]));
+  }
+  for (int k = 0; k < kGyros; ++k) {
+    k3[k] = turn_at(k, middle_b[k], rotated_by_little(h[k], all(0.5) * k2[k] - all(0.125) * cross(k1[k], k2[k])));
+    end_b[k] = end * gyros[k].C_c_b;
+  }
+  for (int k = 0; k < kGyros; ++k) {
+    const V3 k4 = turn_at(k, end_b[k], rotated_by_little(h[k], k3[k]));
+    gyros[k].h_in =
+        rotated_by_little(h[k], all(1.0 / 6) * (k1[k] + all(2) * (k2[k] + k3[k]) + k4 - all(0.5) * cross(k1[k], k4)));
+    gyros[k].C_in_b = end_b[k];
+    gyros[k].h_b = transposed_times(end_b[k], gyros[k].h_in);
   }
 }
 
@@ -261,8 +291,8 @@ TRIHEDRON_INLINE M3 attitude_of(const Gyro (&gyro)[kGyros], const V3 (&h_c)[kGyr
   const V3 x_c = unit(cross(h_c[0], h_c[1]));
   const V3 y_c = unit(h_c[0] + h_c[1]);
   const V3 z_c = cross(x_c, y_c);
-  return {{x_c.x * x + (y_c.x * y + z_c.x * z), x_c.y * x + (y_c.y * y + z_c.y * z),
-           x_c.z * x + (y_c.z * y + z_c.z * z)}};
+  return {
+      {x_c.x * x + (y_c.x * y + z_c.x * z), x_c.y * x + (y_c.y * y + z_c.y * z), x_c.z * x + (y_c.z * y + z_c.z * z)}};
 }
 
 /// core/precession.cpp, precess_two() with sensitivities, of one gyro.
@@ -425,7 +455,8 @@ void fit(const Filter& filter, const Fit& its, const V3 (&at)[kGyros], FittedRea
   const Mask is_told = explained & (sine_square > kLeastSineSquare);
   fitted.unfollowed_square_rad2 = select(is_told, unfollowed, V{});
   fitted.unfollowed_sigma_rad2 = select(is_told, by_chance, V{});
-  fitted.rate_c = {select(explained, rate_c.x, V{}), select(explained, rate_c.y, V{}), select(explained, rate_c.z, V{})};
+  fitted.rate_c = {select(explained, rate_c.x, V{}), select(explained, rate_c.y, V{}),
+                   select(explained, rate_c.z, V{})};
   for (int k = 0; k < kGyros; ++k) {
     fitted.h_b[k] = {select(explained, h_b[k].x, at[k].x), select(explained, h_b[k].y, at[k].y),
                      select(explained, h_b[k].z, at[k].z)};
@@ -740,8 +771,8 @@ void put_reading_noise(Filter& filter, const M3& C_linear, const V& noise_factor
       see_through<3>(filter.root, 0, rows, kStates);
       const V its = second_order_of(alignment, gram(rows, kStates, kStates));
       filter.second_order_reading_rad[k] = select(is_due, its, filter.second_order_reading_rad[k]);
-      const V most = larger(filter.second_order_reading_rad[k],
-                            filter.second_order_prediction_rad_s[k] * kHoldSecondOrder_s);
+      const V most =
+          larger(filter.second_order_reading_rad[k], filter.second_order_prediction_rad_s[k] * kHoldSecondOrder_s);
       all_small = all_small & (most < kSmallSecondOrder * noise_rad[k]);
     }
     filter.second_order_hold_s =
@@ -895,7 +926,8 @@ void finish_fix(Filter& filter, Fix& fix) {
   }
   M3 covariance_rad2;
   put_attitude(filter, fix.readings, fix.attitude, covariance_rad2);
-  fix.sigma_rad = {root(covariance_rad2.column[0].x + fix.jitter_rad2), root(covariance_rad2.column[1].y + fix.jitter_rad2),
+  fix.sigma_rad = {root(covariance_rad2.column[0].x + fix.jitter_rad2),
+                   root(covariance_rad2.column[1].y + fix.jitter_rad2),
                    root(covariance_rad2.column[2].z + fix.jitter_rad2)};
 }
 
@@ -923,7 +955,8 @@ void add_error(const Fix& fix, const M3& truth, const V& counts, Errors& errors)
 
 }  // namespace
 
-const Kernels kKernels = {attitude, turn_momenta, make_normal, read, predict, fit, begin_fix, finish_fix, blend, add_error};
+const Kernels kKernels = {attitude, turn_momenta, make_normal, read,  predict,
+                          fit,      begin_fix,    finish_fix,  blend, add_error};
 
 }  // namespace trihedron::lanes::TRIHEDRON_LANES_PROCESSOR
 

@@ -126,7 +126,7 @@ class Simulation {
   Attitude attitude_{};
   TrueGyro gyros_[kGyros]{};
   M3 end_{};
-  std::vector<InCircle> points_;
+  std::array<std::vector<InCircle>, kGyros> points_;
   std::array<std::vector<V>, kGyros> noise_;
   std::size_t noise_used_ = kNoiseTogether;
   std::array<std::size_t, kWidth> turns_begun_{};
@@ -138,9 +138,13 @@ Simulation::Simulation(std::span<Lane* const> lanes, const Kernels& kernels)
   put_reference();
   put_jitter();
   for (std::size_t i = 0; i < kWidth; ++i) {
-    attitude_.turn_duration_s[i] = attitude_.turn_from.w[i] = 1;
+    attitude_.turns_per_s[i] = attitude_.turn_from.w[i] = 1;
   }
   put_gyros();
+  for (std::size_t k = 0; k < kGyros; ++k) {
+    noise_[k].resize(3 * kNoiseTogether);
+    points_[k].resize(noise_[k].size() / 2);
+  }
 }
 
 void Simulation::put_reference() {
@@ -202,7 +206,7 @@ void Simulation::put_gyros() {
 
 void Simulation::turn_begins(std::size_t i, const sim::SlewPlan::Turn& turn) {
   attitude_.turn_begin_s[i] = turn.begin_s;
-  attitude_.turn_duration_s[i] = turn.end_s - turn.begin_s;
+  attitude_.turns_per_s[i] = 1 / (turn.end_s - turn.begin_s);
   put(turn.from.vec(), i, attitude_.turn_from.v);
   attitude_.turn_from.w[i] = turn.from.w();
   put(turn.rotation_vector_rad, i, attitude_.turn_rad);
@@ -262,24 +266,25 @@ void Simulation::next(V3 (&h_b)[kGyros]) {
 /// Of the next samples, so many that they use whole pairs.
 void Simulation::make_noise() {
   constexpr std::size_t kPoints = 3 * kNoiseTogether / 2;
-  for (std::size_t k = 0; k < kGyros; ++k) {
-    std::vector<InCircle>& points = points_;
-    points.resize(kPoints);
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      std::array<sim::Stream::InCircle, kPoints> of_lane;
-      if (i < lanes_.size()) {
-        lanes_[i]->readout_noise[k].fill(of_lane);
-      } else {
-        of_lane.fill({0, 0, 0.5});
-      }
+  std::array<std::array<sim::Stream::InCircle, kPoints>, kGyros> of_lane;
+  for (auto& points : of_lane) {
+    points.fill({0, 0, 0.5});  // of a lane in which nothing flies
+  }
+  for (std::size_t i = 0; i < kWidth; ++i) {
+    if (i < lanes_.size()) {
+      std::vector<sim::Stream>& streams = lanes_[i]->readout_noise;
+      sim::Stream::fill_both(streams[0], of_lane[0], streams[1], of_lane[1]);
+    }
+    for (std::size_t k = 0; k < kGyros; ++k) {
       for (std::size_t point = 0; point < kPoints; ++point) {
-        put(of_lane[point].x, i, points[point].x);
-        put(of_lane[point].y, i, points[point].y);
-        put(of_lane[point].square, i, points[point].square);
+        put(of_lane[k][point].x, i, points_[k][point].x);
+        put(of_lane[k][point].y, i, points_[k][point].y);
+        put(of_lane[k][point].square, i, points_[k][point].square);
       }
     }
-    noise_[k].resize(2 * kPoints);
-    kernels_.make_normal(points.data(), static_cast<int>(kPoints), noise_[k].data());
+  }
+  for (std::size_t k = 0; k < kGyros; ++k) {
+    kernels_.make_normal(points_[k].data(), static_cast<int>(kPoints), noise_[k].data());
   }
   noise_used_ = 0;
 }
@@ -497,7 +502,8 @@ std::optional<FilterResult> Filters::result(std::size_t i) const {
   const double count = errors_.count[i];
   result.attitude_rms_rad = (vector_of(errors_.squares_rad2, i) / count).cwiseSqrt();
   result.attitude_normalised_square = errors_.normalised[i] / count;
-  const bool is_sound = result.error.allFinite() && result.covariance.allFinite() && result.attitude_rms_rad.allFinite();
+  const bool is_sound =
+      result.error.allFinite() && result.covariance.allFinite() && result.attitude_rms_rad.allFinite();
   return is_sound ? std::optional(std::move(result)) : std::nullopt;
 }
 
@@ -508,9 +514,10 @@ Lane::Lane(const FilterFlight& flight, const Lane* before)
       begin_s(-sim::margin_s(flight.scenario)),
       end_s(to_seconds(flight.scenario.duration) + sim::margin_s(flight.scenario)),
       ephemeris(sim::ephemeris_of(flight.scenario.orbit, begin_s, end_s)),
-      attitude(has_reference_of(before)
-                   ? sim::AttitudeProgramme(scenario->attitude, before->attitude.reference(), scenario->seed, begin_s, end_s)
-                   : sim::AttitudeProgramme(scenario->attitude, *ephemeris, scenario->seed, begin_s, end_s)),
+      attitude(
+          before != nullptr
+              ? sim::AttitudeProgramme(scenario->attitude, before->attitude.reference(), scenario->seed, begin_s, end_s)
+              : sim::AttitudeProgramme(scenario->attitude, *ephemeris, scenario->seed, begin_s, end_s)),
       estimator(estimator_of(flight)) {
   const Scenario& its = flight.scenario;
   for (int k = 0; k < kGyros; ++k) {
@@ -523,21 +530,24 @@ Lane::Lane(const FilterFlight& flight, const Lane* before)
                               its.star_tracker_period, its.seed, events);
 }
 
-/// Whether the reference attitude is that of the other: of the same orbit, steered alike, over the same time.
-bool Lane::has_reference_of(const Lane* other) const {
-  if (other == nullptr) {
-    return false;
-  }
+bool Lane::has_reference_of(const Scenario& other) const {
   using Reference = AttitudeScenario::Reference;
   const Reference reference = scenario->attitude.reference;
-  const auto elements = [](const OrbitScenario& orbit) {
-    return std::tuple(orbit.perigee_altitude_m, orbit.apogee_altitude_m, orbit.inclination_rad,
-                      orbit.ascending_node_rad, orbit.argument_of_perigee_rad, orbit.mean_anomaly_rad);
+  const auto orbit = [](const Scenario& its) {
+    const OrbitScenario& of = its.orbit;
+    return std::tuple(of.perigee_altitude_m, of.apogee_altitude_m, of.inclination_rad, of.ascending_node_rad,
+                      of.argument_of_perigee_rad, of.mean_anomaly_rad, its.duration, sim::margin_s(its));
   };
   return (reference == Reference::kOrbital || reference == Reference::kYawSteered) &&
-         reference == other->scenario->attitude.reference && scenario->orbit.ephemeris.empty() &&
-         other->scenario->orbit.ephemeris.empty() && elements(scenario->orbit) == elements(other->scenario->orbit) &&
-         begin_s == other->begin_s && end_s == other->end_s;
+         reference == other.attitude.reference && scenario->orbit.ephemeris.empty() && other.orbit.ephemeris.empty() &&
+         orbit(*scenario) == orbit(other);
+}
+
+bool Lane::turns_by_little() const {
+  return std::ranges::all_of(gyros, [&](const sim::Gyro& gyro) {
+    const double most_rad_s = gyro.drift().kappa_rad_s().cwiseAbs().sum();
+    return most_rad_s * to_seconds(scenario->gyro_period) < kLittle_rad;
+  });
 }
 
 bool Lane::is_like(const Lane& other) const {

@@ -18,7 +18,7 @@ namespace trihedron::lanes {
 struct Lane {
   using Estimator = InvariantEstimator<kPairCapacity>;
 
-  /// before: null, or one whose reference attitude may be the same.
+  /// before: null, or one that has_reference_of() this flight.
   Lane(const FilterFlight& flight, const Lane* before);
 
   const Scenario* scenario;
@@ -31,11 +31,13 @@ struct Lane {
   StarTrackerTelemetry fixes;
   std::unique_ptr<Estimator> estimator;
 
+  /// Whether the momenta turn by less than kLittle_rad from one sample to the next.
+  [[nodiscard]] bool turns_by_little() const;
   /// Whether both can go side by side: the same times, of samples, fixes, and what the attitude is made of.
   [[nodiscard]] bool is_like(const Lane& other) const;
-
- private:
-  [[nodiscard]] bool has_reference_of(const Lane* other) const;
+  /// Whether its reference attitude is that of the other scenario: of the same orbit, steered alike, over the same
+  /// time.
+  [[nodiscard]] bool has_reference_of(const Scenario& other) const;
 };
 
 /// Flies lanes that are all alike, kWidth of them at most. Nothing for one that has to be flown alone.

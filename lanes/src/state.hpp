@@ -37,6 +37,9 @@ inline constexpr int kColumns = kStates + 1;  ///< of the root of the informatio
 inline constexpr int kComponents = 4;         ///< of a fix
 inline constexpr int kTerms = 4;              ///< of the polynomials through the readings around a fix
 
+/// By which a momentum turns in a step, at most.
+inline constexpr double kLittle_rad = 1e-5;
+
 [[nodiscard]] constexpr int direction_of(int gyro) { return 3 * gyro; }
 [[nodiscard]] constexpr int drift_of(int gyro) { return kMoving + gyro * (kCoefficients + 3); }
 [[nodiscard]] constexpr int alignment_of(int gyro) { return drift_of(gyro) + kCoefficients; }
@@ -54,9 +57,9 @@ struct Attitude {
   int node_count = 0;
   double begin_s = 0;
   double spacing_s = 1;
-  /// from exp([s(u) v×]), u from 0 at `turn_begin_s` to 1 after `turn_duration_s`.
+  /// from exp([s(u) v×]), u = (t − begin) × turns_per_s from 0 to 1.
   V turn_begin_s;
-  V turn_duration_s;
+  V turns_per_s;
   Quaternion turn_from;
   V3 turn_rad;
   const V3* jitter = nullptr;  ///< coefficients; null where there is none

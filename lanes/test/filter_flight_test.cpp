@@ -140,12 +140,20 @@ TEST(Lanes, AFlightOnWhichTheAnglesBetweenTheMomentaAreUsedIsFlownAlone) {
   expect_same(result_of(fly({&flight, 1}).front()), fly_alone(flight));
 }
 
+TEST(Lanes, AFlightWithDriftOfDegreesAMinuteIsFlownAlone) {
+  FilterFlight flight = plain_flight(1, std::chrono::minutes(5));
+  flight.scenario.gyros[0].drift.prior_sigma_rad_s = 1e-3;
+  expect_same(result_of(fly({&flight, 1}).front()), fly_alone(flight));
+}
+
 TEST(Lanes, AreForAPairWithEq1AndNothingElse) {
   using Change = void (*)(FilterFlight&);
   const std::vector<Change> changes = {
       [](FilterFlight& its) { its.scenario.gyros.push_back(its.scenario.gyros.front()); },
       [](FilterFlight& its) { its.scenario.further_star_trackers.emplace_back(); },
-      [](FilterFlight& its) { its.scenario.gyro_gaps = {{10, 20}}; },
+      [](FilterFlight& its) {
+        its.scenario.gyro_gaps = {{10, 20}};
+      },
       [](FilterFlight& its) { its.scenario.gyros[1].drift.outside_sigma_rad_s = 1e-8; },
       [](FilterFlight& its) { its.scenario.gyros[1].drift.warm_up_fraction = 0.1; },
       [](FilterFlight& its) { its.scenario.gyros[1].readout.quantum_rad = 1e-6; },

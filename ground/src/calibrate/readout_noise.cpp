@@ -31,17 +31,19 @@ struct Hour {
   std::size_t begin, end;
 };
 
-using Sizes = std::vector<double>;
+/// Sizes of each component of what is looked at.
+template <std::size_t Components>
+using Sizes = std::array<std::vector<double>, Components>;
 
 /// Sizes of third differences of what is read in samples `lag` apart: add(i, sizes) adds those from sample i on.
 /// Without those over a gap.
-template <class Add>
-Sizes third_differences(const Pass& pass, const Hour& hour, std::size_t lag, const Add& add) {
+template <std::size_t Components, class Add>
+Sizes<Components> third_differences(const Pass& pass, const Hour& hour, std::size_t lag, const Add& add) {
   const GyroTelemetry& readings = pass.gyro;
   const double period_s = to_seconds(pass.settings.gyro_period);
   const double step_s = static_cast<double>(lag) * period_s;
   const std::size_t every = 2 * (hour.end - hour.begin) / kEnoughDifferences + 1;
-  Sizes sizes;
+  Sizes<Components> sizes;
   for (std::size_t i = hour.begin; i + 3 * lag < hour.end; i += every) {
     const auto is_even = [&](std::size_t j) {
       return std::abs(to_seconds(readings.t[i + (j + 1) * lag] - readings.t[i + j * lag]) - step_s) < kEven * period_s;
@@ -53,50 +55,73 @@ Sizes third_differences(const Pass& pass, const Hour& hour, std::size_t lag, con
   return sizes;
 }
 
-/// 1-sigma of what is read, by the lag that shows most; 0 where there are too few readings.
-template <class AddOfLag>
-double noise_over(const Pass& pass, const Hour& hour, const AddOfLag& add_of_lag) {
+/// 1-sigma of what is read by the lags that show most and least of it; 0 where there are too few readings.
+struct NoiseOfLags {
+  double most = 0;
+  double least = 0;
+
+  /// Whether it is as large from one reading to the next as over half a second: what shakes the body, at some
+  /// frequency, is not.
+  [[nodiscard]] bool is_white() const { return least > 0.8 * most; }
+};
+
+/// The root of the mean square of all components, each without its outliers: those of one do not pass for outliers of
+/// another that has less noise.
+template <std::size_t Components, class AddOfLag>
+NoiseOfLags noise_over(const Pass& pass, const Hour& hour, const AddOfLag& add_of_lag) {
   constexpr double kFarthest_s = 0.5;
   const double per_sigma = 1 / std::sqrt(1.0 + 9 + 9 + 1);
-  double noise = 0;
+  NoiseOfLags noise;
   for (std::size_t lag = 1; lag == 1 || static_cast<double>(lag) * to_seconds(pass.settings.gyro_period) <= kFarthest_s;
        lag *= 2) {
-    Sizes sizes = third_differences(pass, hour, lag, add_of_lag(lag));
-    if (sizes.size() >= kLeastDifferences) {
-      noise = std::max(noise, per_sigma * sigma_without_outliers(sizes));
+    Sizes<Components> sizes = third_differences<Components>(pass, hour, lag, add_of_lag(lag));
+    if (sizes[0].size() * Components < kLeastDifferences) {
+      continue;
     }
+    double square = 0;
+    for (std::vector<double>& of_component : sizes) {
+      square += std::pow(per_sigma * sigma_without_outliers(of_component), 2) / Components;
+    }
+    const double its = std::sqrt(square);
+    noise.least = noise.most > 0 ? std::min(noise.least, its) : its;
+    noise.most = std::max(noise.most, its);
   }
   return noise;
 }
 
 /// Of a gyro, by the components across its momentum. Not of readings that repeat themselves.
-double noise_of_gyro(const Pass& pass, int gyro, const Hour& hour) {
-  return noise_over(pass, hour, [&](std::size_t lag) {
-    return [&pass, gyro, lag](std::size_t i, Sizes& sizes) {
+NoiseOfLags noise_of_gyro(const Pass& pass, int gyro, const Hour& hour) {
+  return noise_over<2>(pass, hour, [&](std::size_t lag) {
+    return [&pass, gyro, lag](std::size_t i, Sizes<2>& sizes) {
       const auto h = [&](std::size_t j) { return pass.gyro.direction(i + j * lag, gyro); };
       const Eigen::Vector3d difference = h(3) - h(0) - 3 * (h(2) - h(1));
       const bool repeats = h(0) == h(1) && h(1) == h(2) && h(2) == h(3);
       if (difference.allFinite() && !repeats) {
         const Eigen::Vector3d across = h(1).unitOrthogonal();
-        sizes.push_back(std::abs(across.dot(difference)));
-        sizes.push_back(std::abs(h(1).normalized().cross(across).dot(difference)));
+        sizes[0].push_back(std::abs(across.dot(difference)));
+        sizes[1].push_back(std::abs(h(1).normalized().cross(across).dot(difference)));
       }
     };
   });
 }
 
-/// Angles between the momentum of each gyro and that of the next one, which no motion of the body changes.
-class Angles {
+/// The momentum of each gyro and that of the next one: the angle between them, which no motion of the body changes, and
+/// what they do in their plane.
+class Pairs {
  public:
-  Angles(const Pass& pass, int gyros) : readings_(pass.gyro) {
+  Pairs(const Pass& pass, int gyros) : readings_(pass.gyro) {
     for (int k = 0; k < gyros; ++k) {
       const GyroPrior& prior = pass.settings.gyros[static_cast<std::size_t>(k)];
       C_c_b_[k] = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
     }
   }
-  [[nodiscard]] double at(std::size_t sample, int gyro) const {
-    const Eigen::Vector3d a = C_c_b_[gyro] * readings_.direction(sample, gyro);
-    const Eigen::Vector3d b = C_c_b_[gyro + 1] * readings_.direction(sample, gyro + 1);
+  /// As read in a sample, c axes.
+  [[nodiscard]] Eigen::Vector3d momentum(std::size_t sample, int gyro) const {
+    return C_c_b_[gyro] * readings_.direction(sample, gyro);
+  }
+  [[nodiscard]] double angle(std::size_t sample, int gyro) const {
+    const Eigen::Vector3d a = momentum(sample, gyro);
+    const Eigen::Vector3d b = momentum(sample, gyro + 1);
     return std::atan2(a.cross(b).norm(), a.dot(b));
   }
 
@@ -105,32 +130,64 @@ class Angles {
   PerGyro<Eigen::Matrix3d> C_c_b_;
 };
 
-double noise_of_angle(const Pass& pass, const Angles& angles, int gyro, const Hour& hour) {
-  return noise_over(pass, hour, [&](std::size_t lag) {
-    return [&angles, gyro, lag](std::size_t i, Sizes& sizes) {
-      const auto angle = [&](std::size_t j) { return angles.at(i + j * lag, gyro); };
+double noise_of_angle(const Pass& pass, const Pairs& pairs, int gyro, const Hour& hour) {
+  const auto add_of_lag = [&](std::size_t lag) {
+    return [&pairs, gyro, lag](std::size_t i, Sizes<1>& sizes) {
+      const auto angle = [&](std::size_t j) { return pairs.angle(i + j * lag, gyro); };
       const double difference = angle(3) - angle(0) - 3 * (angle(2) - angle(1));
       if (std::isfinite(difference)) {
-        sizes.push_back(std::abs(difference));
+        sizes[0].push_back(std::abs(difference));
       }
     };
-  });
+  };
+  return noise_over<1>(pass, hour, add_of_lag).most;
+}
+
+/// Of both momenta of a pair together, in their plane: as much as of the angle between them where the body is still
+/// about the normal of the plane.
+double noise_in_plane(const Pass& pass, const Pairs& pairs, int gyro, const Hour& hour) {
+  const auto add_of_lag = [&](std::size_t lag) {
+    return [&pairs, gyro, lag](std::size_t i, Sizes<2>& sizes) {
+      const auto difference = [&](int k) -> Eigen::Vector3d {
+        const auto h = [&](std::size_t j) { return pairs.momentum(i + j * lag, k); };
+        return h(3) - h(0) - 3 * (h(2) - h(1));
+      };
+      const Eigen::Vector3d a = pairs.momentum(i + lag, gyro);
+      const Eigen::Vector3d b = pairs.momentum(i + lag, gyro + 1);
+      const Eigen::Vector3d normal = a.cross(b).normalized();
+      const double of_a = normal.cross(a).dot(difference(gyro));
+      const double of_b = normal.cross(b).dot(difference(gyro + 1));
+      if (std::isfinite(of_a) && std::isfinite(of_b)) {
+        sizes[0].push_back(std::abs(of_a));
+        sizes[1].push_back(std::abs(of_b));
+      }
+    };
+  };
+  return std::sqrt(2.0) * noise_over<2>(pass, hour, add_of_lag).most;
 }
 
 /// That of each gyro, for an hour; 0 where there are too few readings. What shakes the body is in none of the angles:
-/// where they show less than the readings, that is divided between the gyros as the settings have it.
-PerGyro<double> noise_of_hour(const Pass& pass, const Angles& angles, int gyros, const Hour& hour) {
+/// where they show less than the readings, that is divided between the gyros as the settings have it. Unless the body
+/// is still about the normal of the momenta's plane and the readings of both gyros are of white noise: then it is noise
+/// of axes that the angle does not show.
+PerGyro<double> noise_of_hour(const Pass& pass, const Pairs& pairs, int gyros, const Hour& hour) {
   constexpr double kMoreThanChance = 1.2;
   const auto told_rad = [&](int k) { return pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad; };
   PerGyro<double> noise_rad{};
+  GyroMask is_white{};
   for (int k = 0; k < gyros; ++k) {
-    noise_rad[k] = noise_of_gyro(pass, k, hour);
+    const NoiseOfLags noise = noise_of_gyro(pass, k, hour);
+    noise_rad[k] = noise.most;
+    is_white[k] = noise.is_white();
   }
   for (int k = 0; k + 1 < gyros; ++k) {
-    const double of_angle = noise_of_angle(pass, angles, k, hour);
+    const double of_angle = noise_of_angle(pass, pairs, k, hour);
     const double of_readings = std::hypot(noise_rad[k], noise_rad[k + 1]);
     const double told = std::hypot(told_rad(k), told_rad(k + 1));
-    if (of_angle > 0 && told > 0 && of_readings > kMoreThanChance * of_angle) {
+    const auto is_of_body = [&] {
+      return !is_white[k] || !is_white[k + 1] || noise_in_plane(pass, pairs, k, hour) > kMoreThanChance * of_angle;
+    };
+    if (of_angle > 0 && told > 0 && of_readings > kMoreThanChance * of_angle && is_of_body()) {
       noise_rad[k] = of_angle * told_rad(k) / told;
       noise_rad[k + 1] = of_angle * told_rad(k + 1) / told;
     }
@@ -139,13 +196,13 @@ PerGyro<double> noise_of_hour(const Pass& pass, const Angles& angles, int gyros,
 }
 
 /// Of the hours of the pass that have enough readings, gyro by gyro, in ascending order.
-PerGyro<std::vector<double>> noise_by_hours(const Pass& pass, const Angles& angles, int gyros) {
+PerGyro<std::vector<double>> noise_by_hours(const Pass& pass, const Pairs& pairs, int gyros) {
   const std::size_t size = pass.gyro.size();
   const double hours = static_cast<double>(size) * to_seconds(pass.settings.gyro_period) / 3600;
   const auto stretches = std::max<std::size_t>(static_cast<std::size_t>(hours), 1);
   PerGyro<std::vector<double>> noise_rad;
   for (std::size_t n = 0; n < stretches; ++n) {
-    const PerGyro<double> its = noise_of_hour(pass, angles, gyros, {n * size / stretches, (n + 1) * size / stretches});
+    const PerGyro<double> its = noise_of_hour(pass, pairs, gyros, {n * size / stretches, (n + 1) * size / stretches});
     for (int k = 0; k < gyros; ++k) {
       if (its[k] > 0) {
         noise_rad[k].push_back(its[k]);
@@ -177,18 +234,18 @@ double rate_over(const Pass& pass, std::size_t first) {
 }
 
 /// Size of the sixth difference of an angle. What is as smooth as a polynomial of fifth degree is not in it.
-double sixth_difference(const Angles& angles, int gyro, std::size_t first) {
+double sixth_difference(const Pairs& pairs, int gyro, std::size_t first) {
   constexpr double kBinomial[kOfSixth] = {1, -6, 15, -20, 15, -6, 1};
   double sum = 0;
   for (std::size_t i = 0; i < kOfSixth; ++i) {
-    sum += kBinomial[i] * angles.at(first + i, gyro);
+    sum += kBinomial[i] * pairs.angle(first + i, gyro);
   }
   return std::abs(sum);
 }
 
 /// Noise of the angles between the momenta where the body turns fast over that where it does not: the most of the pairs
 /// of gyros, 1 where the pass has too few such readings.
-double noise_in_slews_over_rest(const Pass& pass, const Angles& angles, int gyros) {
+double noise_in_slews_over_rest(const Pass& pass, const Pairs& pairs, int gyros) {
   constexpr std::size_t kMostSixths = 20000;
   constexpr std::size_t kFewestSixths = 300;
   if (pass.gyro.size() < kOfSixth) {
@@ -208,7 +265,7 @@ double noise_in_slews_over_rest(const Pass& pass, const Angles& angles, int gyro
     std::vector<double> in_slews;
     std::vector<double> at_rest;
     for (std::size_t n = 0; n < rates.size(); ++n) {
-      const double size = sixth_difference(angles, k, n * every);
+      const double size = sixth_difference(pairs, k, n * every);
       if (!(size > 0)) {  // readings that are missing, or repeat themselves
         continue;
       }
@@ -329,8 +386,8 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
   }
   ReadoutNoise noise;
   noise.gyros = std::min({pass.gyro.gyros, static_cast<int>(pass.settings.gyros.size()), kMaxGyros});
-  const Angles angles(pass, noise.gyros);
-  const PerGyro<std::vector<double>> by_hours = noise_by_hours(pass, angles, noise.gyros);
+  const Pairs pairs(pass, noise.gyros);
+  const PerGyro<std::vector<double>> by_hours = noise_by_hours(pass, pairs, noise.gyros);
   bool is_found = noise.gyros >= 2;
   for (int k = 0; k < noise.gyros; ++k) {
     noise.told_rad[k] = noise.found_rad[k] = noise.most_rad[k] =
@@ -343,7 +400,7 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
       is_found = false;
     }
   }
-  noise.in_slews = noise_in_slews_over_rest(pass, angles, noise.gyros);
+  noise.in_slews = noise_in_slews_over_rest(pass, pairs, noise.gyros);
   if (is_found && noise.is_steady()) {
     noise.lasting = lasting_noise(pass, noise.found_rad, noise.gyros);
   }

@@ -159,8 +159,8 @@ void judge_step(const Pass& pass, const ClockStep& step, Finding::Severity sever
   add(findings, FindingCode::kClockStepped, severity,
       fmt::format("Between {} and {} min the clock of {} is off by another amount than over the rest of the pass{}.",
                   minutes(step.from), minutes(step.until), whose, what_of_it),
-      fmt::format("there {} later than over the rest, by {}",
-                  of_star_tracker ? "fixes were taken" : "its stamps are", size),
+      fmt::format("there {} later than over the rest, by {}", of_star_tracker ? "fixes were taken" : "its stamps are",
+                  size),
       fmt::format(
           "Add {:+.4f} s to the stamps of {} there, or cut the pass there and calibrate on the parts apart; look "
           "for what happened to its clock.",
@@ -339,13 +339,12 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     add(findings, FindingCode::kClocksApart, wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
         fmt::format("The stamps of the star tracker are off those of the gyros{}, which is in the attitude. {}",
                     corrected ? kAfterCorrection : "", kWhichClock),
-        fmt::format(
-            "fixes were taken {} after their stamp in the middle of the pass; over the pass that changes "
-            "by {}{}",
-            offset_text(middle.value), offset_text(change_s),
-            turned_sigmas > kSeenTurned
-                ? fmt::format("; in that time the body turns by {:.1f} sigmas of the attitude", turned_sigmas)
-                : ""),
+        fmt::format("fixes were taken {} after their stamp in the middle of the pass; over the pass that changes "
+                    "by {}{}",
+                    offset_text(middle.value), offset_text(change_s),
+                    turned_sigmas > kSeenTurned
+                        ? fmt::format("; in that time the body turns by {:.1f} sigmas of the attitude", turned_sigmas)
+                        : ""),
         corrected ? kCureAfterCorrection
                   : cure_of_star_tracker(pass.settings, at_epoch.value, change_s == 0 ? 0 : clocks.rate_s_s.value));
   }

@@ -73,6 +73,26 @@ TEST(ReadoutNoise, IsFoundForEachGyro) {
   EXPECT_NEAR(less->found_rad[0], 1e-6, 0.03e-6);
 }
 
+TEST(ReadoutNoise, OfOneAxisIsFoundWhateverItDoesToTheAngleBetweenTheMomenta) {
+  struct OfAxis {
+    int axis;
+    std::size_t calls = 0;
+    White white{.sigma_rad = {1e-5, 1e-5}};
+    double operator()(int gyro) {
+      const int its = static_cast<int>(calls++ % 3);
+      return (gyro == 0 && its == axis ? 5 : 1) * white(gyro);
+    }
+  };
+  for (const int axis : {1, 2}) {  // the momentum lies along the other
+    const auto noise =
+        other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), OfAxis{.axis = axis}));
+    ASSERT_TRUE(noise);
+    EXPECT_GT(noise->found_rad[0], 3e-5) << axis;
+    EXPECT_LT(noise->found_rad[0], 4e-5) << axis;  // the root of the mean square of 5e-5 and 1e-5 is 3.6e-5
+    EXPECT_NEAR(noise->found_rad[1], 1e-5, 0.03e-5);
+  }
+}
+
 TEST(ReadoutNoise, IsThatOfTheSettingsWhereThePassShowsThatOrTooLittle) {
   const White as_told{.sigma_rad = {1.1e-5, 0.9e-5}};
   EXPECT_FALSE(other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), as_told)));

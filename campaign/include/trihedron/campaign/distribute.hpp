@@ -12,7 +12,8 @@
 
 namespace trihedron::campaign {
 
-/// What has happened to a worker, which is a process that performs the runs that it is given, one at a time or together.
+/// What has happened to a worker, which is a process that performs the runs that it is given, one at a time or
+/// together.
 struct WorkerEvent {
   enum class Kind : std::uint8_t {
     kReady,      ///< it is there and has nothing to do
@@ -42,10 +43,10 @@ class Workers {
 /// Processes that one run may end before it counts as failed.
 inline constexpr int kProcessesForARun = 2;
 
-/// Gives runs to workers as they have nothing to do, as many as are best performed together, and hands over what has come,
-/// in no order. Runs whose worker ends are given to others, each by itself; a run whose worker ends a second time has
-/// failed. Throws what `workers` and `collect` throw, and
-/// std::logic_error where a worker gives a record of another run than it was given.
+/// Gives runs to workers as they have nothing to do, as many as are best performed together, and hands over what has
+/// come, in no order. Runs whose worker ends are given to others, each by itself; a run whose worker ends a second time
+/// has failed. Throws what `workers` and `collect` throw, and std::logic_error where a worker gives a record of another
+/// run than it was given.
 void distribute(const CampaignPlan& plan, std::span<const std::uint64_t> runs, Workers& workers,
                 const Collect& collect);
 

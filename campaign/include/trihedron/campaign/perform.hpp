@@ -58,8 +58,8 @@ struct Flight {
 /// Takes over records as they come: one call at a time, in no order.
 using Collect = std::function<void(std::vector<RunRecord>&& records)>;
 
-/// Performs runs side by side, those that are performed together on one core, and hands over records when they are there. jobs: 1 or more threads.
-/// Throws as perform(), and what `collect` throws.
+/// Performs runs side by side, those that are performed together on one core, and hands over records when they are
+/// there. jobs: 1 or more threads. Throws as perform(), and what `collect` throws.
 void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const SetupOf& setup_of, unsigned jobs,
                  const Collect& collect);
 

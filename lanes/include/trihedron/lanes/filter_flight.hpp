@@ -49,8 +49,8 @@ using FilterOutcome = std::variant<FilterResult, FilterFailure>;
 /// The same by the on-board step, from a whole simulated pass. Throws std::invalid_argument and ground::SetupError.
 [[nodiscard]] FilterResult fly_alone(const FilterFlight& flight);
 
-/// Whether flights of this kind go side by side: a pair with eq. (1), without faults of the gyros, drift that changes or
-/// drift that eq. (1) does not contain. Throws as fly_alone().
+/// Whether flights of this kind go side by side: a pair with eq. (1), without faults of the gyros, drift that changes
+/// or drift that eq. (1) does not contain. Throws as fly_alone().
 [[nodiscard]] bool goes_in_lanes(const FilterFlight& flight);
 
 /// Flights that fill the lanes of one thread.

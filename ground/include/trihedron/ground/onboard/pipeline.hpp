@@ -22,10 +22,10 @@
 
 namespace trihedron::ground {
 
-/// The estimator of a Pipeline of two gyros with eq. (1) and nothing further, set up as that would. Throws SetupError, and
-/// std::invalid_argument for any other layout.
+/// The estimator of a Pipeline of two gyros with eq. (1) and nothing further, set up as that would. Throws SetupError,
+/// and std::invalid_argument for any other layout.
 [[nodiscard]] std::unique_ptr<InvariantEstimator<kPairCapacity>> pair_estimator(const PassSettings& settings,
-                                                                              const CalibrationOptions& options);
+                                                                                const CalibrationOptions& options);
 
 /// Everything that it does is in its reports. Its results depend on nothing but the events that it was given. Where
 /// something is estimated at orbital period and the options do not tell the rate of the orbit, that of an earlier
