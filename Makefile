@@ -9,7 +9,7 @@ PYTHON_TOOLS := build-python/tools
 DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly thorough docs shown \
+.PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign filters consistency forecasts verdict fuzz fuzz-build fuzz-briefly thorough docs shown \
   format lint alone \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
@@ -24,6 +24,7 @@ help:
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make campaign  fly the campaign that docs/validation.md tells of; goes on where it was interrupted'
+	@echo 'make filters  fly ten thousand flights of the filter alone, of which docs/validation.md tells: five minutes'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make forecasts  measure again what docs/forecasts.md tells: hours; goes on where it was interrupted'
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
@@ -160,6 +161,11 @@ campaign: build
 	@cmake/setup.sh tests
 	@mkdir -p out
 	validation/validate.py $(BUILD)/trihedron docs/validation.md --campaign out/campaign
+
+filters: build
+	@cmake/setup.sh tests
+	@mkdir -p out
+	validation/validate.py $(BUILD)/trihedron docs/validation.md --filters out/filters
 
 interop: build
 	@cmake/setup.sh interop

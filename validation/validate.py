@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Measures what docs/validation.md tells, and writes its tables: validate.py PROGRAM DOCUMENT [--campaign OUT].
+"""Measures what docs/validation.md tells, and writes its tables: validate.py PROGRAM DOCUMENT [--campaign OUT] [--filters OUT].
 
-Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone. With --campaign that of the campaign alone, whose
-runs are in OUT; those that are missing there are performed first.
+Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone. With --campaign or --filters that of this campaign alone,
+whose runs are in OUT; those that are missing there are performed first.
 """
 import argparse
 import functools
@@ -190,12 +190,14 @@ def angle_of_two(rad):
     return f"{rad / ARCSECOND:.2f}″" if rad < 10 * ARCSECOND else angle(rad)
 
 
-def campaign(bench, out):
-    arguments = ["--json", "campaign", CAMPAIGN, "-o", out] + (["--resume"] if (out / "runs.journal").exists() else [])
+def campaign(bench, file, out):
+    arguments = ["--json", "campaign", file, "-o", out] + (["--resume"] if (out / "runs.journal").exists() else [])
     told = json.loads(bench.run(*arguments))
     rows = []
     for key, what in MEASURES.items():
         measure = told["measures"][key]
+        if not measure["quantiles"]:  # a campaign of filters alone does not have it
+            continue
         bound = measure["quantiles"][-1]["lower" if key in ("interval_after", "extension") else "upper"]
         rows.append([what, *(measured(one["value"], measure["unit"]) for one in measure["quantiles"]),
                      measured(bound, measure["unit"]) if bound is not None else "too few runs"])
@@ -207,7 +209,7 @@ def campaign(bench, out):
             f"Findings of the campaign: {findings}.\n\n" + table(["", "50 %", "90 %", "95 %", "99.7 %", "99.7 %, with 90 % confidence"], rows))
 
 
-CAMPAIGN = pathlib.Path(__file__).resolve().parent / "campaign.toml"
+HERE = pathlib.Path(__file__).resolve().parent
 MEASURES = {"alignment_error": "alignment error, worst gyro", "attitude_rms": "attitude of the calibration, rms",
             "navigation_error": "navigator, corrected every 90 min, largest error", "open_loop_error": "open loop of 90 min, largest error",
             "open_loop_error_to_end": "open loop to the end of the pass, largest error", "drift_settled": "drift coefficients settled",
@@ -221,9 +223,12 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("document", type=pathlib.Path)
-    parser.add_argument("--campaign", metavar="OUT", type=pathlib.Path)
+    campaigns = ("campaign", "filters")
+    for name in campaigns:
+        parser.add_argument(f"--{name}", metavar="OUT", type=pathlib.Path)
     given = parser.parse_args()
-    tables = {"campaign": functools.partial(campaign, out=given.campaign.resolve())} if given.campaign else TABLES
+    outs = {name: vars(given)[name] for name in campaigns if vars(given)[name]}
+    tables = {name: functools.partial(campaign, file=HERE / f"{name}.toml", out=out.resolve()) for name, out in outs.items()} or TABLES
     text = given.document.read_text()
     with tempfile.TemporaryDirectory() as directory:
         bench = Bench(given.program.resolve(), pathlib.Path(directory))

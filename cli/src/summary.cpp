@@ -123,11 +123,11 @@ std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {
   }
   if (clocks->step) {
     const ClockStep& step = *clocks->step;
-    text += fmt::format(
-        "            between t = {:.0f} s and {:.0f} s {} {:+.2f} ± {:.2f} ms later than over the rest\n",
-        to_seconds(step.from - epoch), to_seconds(step.until - epoch),
-        step.gyro < 0 ? std::string("fixes were taken") : fmt::format("gyro {} is stamped", step.gyro + 1),
-        1e3 * step.change_s.value, 1e3 * step.change_s.sigma);
+    text +=
+        fmt::format("            between t = {:.0f} s and {:.0f} s {} {:+.2f} ± {:.2f} ms later than over the rest\n",
+                    to_seconds(step.from - epoch), to_seconds(step.until - epoch),
+                    step.gyro < 0 ? std::string("fixes were taken") : fmt::format("gyro {} is stamped", step.gyro + 1),
+                    1e3 * step.change_s.value, 1e3 * step.change_s.sigma);
   }
   return text;
 }

@@ -127,7 +127,7 @@ class Simulation {
   TrueGyro gyros_[kGyros]{};
   M3 end_{};
   std::array<std::vector<InCircle>, kGyros> points_;
-  std::array<std::vector<V>, kGyros> noise_;
+  std::array<std::vector<V3>, kGyros> noise_;
   std::size_t noise_used_ = kNoiseTogether;
   std::array<std::size_t, kWidth> turns_begun_{};
   double next_turn_s_ = -std::numeric_limits<double>::infinity();
@@ -142,8 +142,8 @@ Simulation::Simulation(std::span<Lane* const> lanes, const Kernels& kernels)
   }
   put_gyros();
   for (std::size_t k = 0; k < kGyros; ++k) {
-    noise_[k].resize(3 * kNoiseTogether);
-    points_[k].resize(noise_[k].size() / 2);
+    noise_[k].resize(kNoiseTogether);
+    points_[k].resize(3 * kNoiseTogether / 2);
   }
 }
 
@@ -256,10 +256,8 @@ void Simulation::next(V3 (&h_b)[kGyros]) {
   if (noise_used_ == kNoiseTogether) {
     make_noise();
   }
-  const V* first = &noise_[0][3 * noise_used_];
-  const V* second = &noise_[1][3 * noise_used_];
+  const V3 noise[kGyros] = {noise_[0][noise_used_], noise_[1][noise_used_]};
   ++noise_used_;
-  const V3 noise[kGyros] = {{first[0], first[1], first[2]}, {second[0], second[1], second[2]}};
   kernels_.read(gyros_, noise, h_b);
 }
 
@@ -284,7 +282,7 @@ void Simulation::make_noise() {
     }
   }
   for (std::size_t k = 0; k < kGyros; ++k) {
-    kernels_.make_normal(points_[k].data(), static_cast<int>(kPoints), noise_[k].data());
+    kernels_.make_normal(points_[k].data(), static_cast<int>(kPoints), &noise_[k][0].x);
   }
   noise_used_ = 0;
 }

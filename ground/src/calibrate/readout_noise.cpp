@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "calibrate/at_rest.hpp"
@@ -163,7 +164,7 @@ double noise_in_plane(const Pass& pass, const Pairs& pairs, int gyro, const Hour
       }
     };
   };
-  return std::sqrt(2.0) * noise_over<2>(pass, hour, add_of_lag).most;
+  return std::numbers::sqrt2 * noise_over<2>(pass, hour, add_of_lag).most;
 }
 
 /// That of each gyro, for an hour; 0 where there are too few readings. What shakes the body is in none of the angles:

@@ -16,8 +16,8 @@ namespace trihedron::ground {
 /// further states.
 [[nodiscard]] CalibrationOptions settled_as_told(CalibrationOptions options);
 
-/// As settled_before() for what is flown event by event. Where the navigator takes over the estimates, their sigmas are widened
-/// where the innovations are correlated in time.
+/// As settled_before() for what is flown event by event. Where the navigator takes over the estimates, their sigmas are
+/// widened where the innovations are correlated in time.
 [[nodiscard]] CalibrationOptions settled_for_flight(const PassSettings& settings, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground
