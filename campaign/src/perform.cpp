@@ -228,37 +228,41 @@ RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
 
 namespace {
 
-/// What fly_filters() makes of a flight.
+/// What fly_filters() makes of a flight, of the gyros of the plan: a run may have more or fewer.
 RunRecord record_of(const lanes::FilterResult& result, const CampaignPlan& plan) {
-  const auto gyros = static_cast<Eigen::Index>(plan.gyros);
-  constexpr auto kCoefficients = static_cast<Eigen::Index>(kCampaignCoefficients);
-  constexpr auto kParameters = static_cast<Eigen::Index>(kCampaignParameters);
+  const std::size_t gyros = std::min(plan.gyros, static_cast<std::size_t>(result.error.size()) / kCampaignParameters);
+  const auto size = static_cast<Eigen::Index>(gyros * kCampaignParameters);
+  const Eigen::VectorXd error = result.error.head(size);
+  const Eigen::MatrixXd covariance = result.covariance.topLeftCorner(size, size);
   RunRecord record;
   record.outcome = result.reopened == 0 ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
   if (result.reopened > 0) {
     record.findings.emplace_back(name_of(FindingCode::kReopened));
   }
   record.drift_model = name_of(result.drift_model);
-  const Eigen::VectorXd sigma = result.covariance.diagonal().cwiseSqrt();
-  const auto put = [&](RunQuantity quantity, const Eigen::VectorXd& of, Eigen::Index first, Eigen::Index size) {
-    for (Eigen::Index k = 0; k < gyros; ++k) {
-      const Eigen::VectorXd its = of.segment(k * kParameters + first, size);
-      record[quantity].insert(record[quantity].end(), its.begin(), its.end());
+  for (const RunQuantityRow& row : kRunQuantityRows) {
+    if (plan.has(row.quantity)) {
+      record[row.quantity].assign(size_of(row.shape, plan.gyros), kNone);
     }
-  };
-  put(RunQuantity::kDriftError, result.error, 0, kCoefficients);
-  put(RunQuantity::kDriftSigma, sigma, 0, kCoefficients);
-  put(RunQuantity::kAlignmentError, result.error, kCoefficients, kParameters - kCoefficients);
-  put(RunQuantity::kAlignmentSigma, sigma, kCoefficients, kParameters - kCoefficients);
-  if (plan.keeps_covariance) {
-    record[RunQuantity::kCovariance].assign(result.covariance.data(),
-                                            result.covariance.data() + result.covariance.size());
+  }
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const std::size_t gyro = static_cast<std::size_t>(i) / kCampaignParameters;
+    const std::size_t its = static_cast<std::size_t>(i) % kCampaignParameters;
+    const bool of_alignment = its >= kCampaignCoefficients;
+    const std::size_t place =
+        of_alignment ? 3 * gyro + its - kCampaignCoefficients : kCampaignCoefficients * gyro + its;
+    record[of_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError][place] = error(i);
+    record[of_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma][place] = std::sqrt(covariance(i, i));
+    for (Eigen::Index j = 0; plan.keeps_covariance && j < size; ++j) {
+      const std::size_t row = static_cast<std::size_t>(i) * plan.gyros * kCampaignParameters;
+      record[RunQuantity::kCovariance][row + static_cast<std::size_t>(j)] = covariance(i, j);
+    }
   }
   const auto mean = [](double sum, std::size_t count) { return count > 0 ? sum / static_cast<double>(count) : kNone; };
-  record[RunQuantity::kNees] = {ground::normalised_square(result.error, result.covariance)};
-  record[RunQuantity::kNeesFreedom] = {static_cast<double>(result.error.size())};
+  record[RunQuantity::kNees] = {ground::normalised_square(error, covariance)};
+  record[RunQuantity::kNeesFreedom] = {static_cast<double>(size)};
   record[RunQuantity::kNisMean] = {mean(result.nis_sum, result.fixes_used)};
-  record[RunQuantity::kNisFreedom] = {2.0 * static_cast<double>(gyros)};
+  record[RunQuantity::kNisFreedom] = {2.0 * static_cast<double>(result.error.size()) / kCampaignParameters};
   record[RunQuantity::kNisFixes] = {static_cast<double>(result.fixes_used)};
   record[RunQuantity::kNisMeanOfAll] = {mean(result.nis_sum_of_judged, result.fixes_judged)};
   record[RunQuantity::kNisFixesOfAll] = {static_cast<double>(result.fixes_judged)};
@@ -335,6 +339,19 @@ void name(const CampaignPlan& plan, std::uint64_t run, RunRecord& record) {
   record.draws = draws_of_run(plan, run);
 }
 
+/// What `calibrate` makes of the flight of a filter, where it makes anything of it.
+void fly_beside(const RunSetup& setup, double limit_rad, const std::function<void(Flight&&)>& flown) {
+  std::optional<Flight> flight;
+  try {
+    flight = fly(setup, limit_rad, ground::OpenLoopScope::kAll);
+  } catch (const std::invalid_argument&) {
+    return;
+  } catch (const ground::SetupError&) {
+    return;
+  }
+  flown(std::move(*flight));
+}
+
 std::vector<RunRecord> fly_filters(const CampaignPlan& plan, std::span<const std::uint64_t> runs,
                                    const SetupOf& setup_of) {
   std::vector<std::optional<RunRecord>> records(runs.size());
@@ -367,10 +384,14 @@ std::vector<RunRecord> fly_filters(const CampaignPlan& plan, std::span<const std
 
 RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of,
                   const std::function<void(Flight&&)>& flown) {
-  const Begun begun;
-  if (plan.work == CampaignWork::kFilter && !flown) {
-    return perform_together(plan, {&run, 1}, setup_of).front();
+  if (plan.work == CampaignWork::kFilter) {
+    RunRecord record = perform_together(plan, {&run, 1}, setup_of).front();
+    if (flown && record.outcome != RunOutcome::kFailed) {
+      fly_beside(setup_of(record.seed, record.draws), plan.limit_rad, flown);
+    }
+    return record;
   }
+  const Begun begun;
   RunRecord record;
   std::variant<RunSetup, RunRecord> setup = setup_or_failure(plan, run, setup_of);
   if (auto* const failure = std::get_if<RunRecord>(&setup)) {
@@ -379,8 +400,7 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& se
     record = unless_it_fails(plan, run, [&] {
       Flight flight = fly(std::get<RunSetup>(setup), plan.limit_rad,
                           flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
-      RunRecord its =
-          plan.work == CampaignWork::kFilter ? fly_filters(plan, {&run, 1}, setup_of).front() : record_of(flight, plan);
+      RunRecord its = record_of(flight, plan);
       if (flown) {
         flown(std::move(flight));
       }
@@ -417,7 +437,8 @@ std::vector<RunRecord> perform_together(const CampaignPlan& plan, std::span<cons
 void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const SetupOf& setup_of, unsigned jobs,
                  const Collect& collect) {
   std::mutex one_at_a_time;
-  const std::size_t together = runs_together(plan);
+  const std::size_t for_each_job = (runs.size() + jobs - 1) / jobs;
+  const std::size_t together = std::clamp<std::size_t>(for_each_job, 1, runs_together(plan));
   ground::with_cores(jobs, [&] {
     ground::for_each_on_all_cores((runs.size() + together - 1) / together, [&](std::size_t i) {
       const std::span<const std::uint64_t> some =

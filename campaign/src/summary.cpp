@@ -380,7 +380,7 @@ std::map<std::string, std::size_t> runs_by_finding(const Records& records) {
   return runs;
 }
 
-void judge_verdicts(const Records& trustworthy, const Records& finished, CampaignSummary& summary) {
+void judge_verdicts(CampaignWork work, const Records& trustworthy, const Records& finished, CampaignSummary& summary) {
   Records refused;
   std::ranges::copy_if(finished, std::back_inserter(refused),
                        [](const RunRecord* record) { return record->outcome == RunOutcome::kDoNotUse; });
@@ -402,16 +402,19 @@ void judge_verdicts(const Records& trustworthy, const Records& finished, Campaig
       why = fmt::format("; most often {}, in {} of these", code, count);
     }
   }
+  const bool are_filters = work == CampaignWork::kFilter;
   summary.campaign_findings.push_back(
       {"runs-not-trustworthy",
-       fmt::format("{} of {} calibrations say of themselves: do not use.", refused.size(), finished.size()),
+       fmt::format("{} of {} {}.", refused.size(), finished.size(),
+                   are_filters ? "filters began anew on the way" : "calibrations say of themselves: do not use"),
        fmt::format("{:.1f} % of the runs{}",
                    100.0 * static_cast<double>(refused.size()) / static_cast<double>(finished.size()), why),
-       "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
+       are_filters ? "Look at one with --only: the fixes contradicted what the filter had found."
+                   : "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
        trustworthy.empty() ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
 }
 
-void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
+void judge_nees(CampaignWork work, const Records& trustworthy, CampaignSummary& summary) {
   if (!summary.nees) {
     return;
   }
@@ -446,15 +449,17 @@ void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
     }
   }
   if (!wrong.empty()) {
+    const bool are_filters = work == CampaignWork::kFilter;
     const double share = static_cast<double>(wrong.size()) / static_cast<double>(trustworthy.size());
     summary.campaign_findings.push_back(
         {"trusted-but-wrong",
-         fmt::format("{} run{} called trustworthy {} errors that {} sigmas rule out.", wrong.size(),
-                     wrong.size() == 1 ? "" : "s", wrong.size() == 1 ? "has" : "have",
+         fmt::format("{} run{}{} {} errors that {} sigmas rule out.", wrong.size(), wrong.size() == 1 ? "" : "s",
+                     are_filters ? "" : " called trustworthy", wrong.size() == 1 ? "has" : "have",
                      wrong.size() == 1 ? "its" : "their"),
          fmt::format("{:.2g} % of the trustworthy runs have a NEES that chance passes once in a million: runs {}",
                      100 * share, listed(wrong)),
-         "Look at them with --only: their verdict missed something.",
+         are_filters ? "Look at them with --only: the model of the filter does not hold there."
+                     : "Look at them with --only: their verdict missed something.",
          is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse
                                                                       : FindingSeverity::kWarning});
   }
@@ -557,8 +562,8 @@ CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> r
   find_cells(plan, records, summary);
   find_worst(records, finished, summary);
   judge_failures(records, summary);
-  judge_verdicts(trustworthy, finished, summary);
-  judge_nees(trustworthy, summary);
+  judge_verdicts(plan.work, trustworthy, finished, summary);
+  judge_nees(plan.work, trustworthy, summary);
   judge_nis(summary);
   judge_number(trustworthy, summary);
   return summary;

@@ -146,6 +146,55 @@ TEST(CampaignOfFilters, MeasuresWhatACalibrationOfTheSameFlightsHas) {
   }
 }
 
+TEST(CampaignOfFilters, AreMeasuredByTheGyrosOfThePlanWhateverARunHas) {
+  const auto two_or_three = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = flight_of_eq1(seed, draws);
+    if (draws[0] > 2.5) {
+      GyroScenario third = setup.scenario.gyros.front();
+      third.start_direction_c = {0.1, 0.2, 0.97};
+      setup.scenario.gyros.push_back(third);
+    }
+    return setup;
+  };
+  for (const std::size_t gyros : {2U, 3U}) {
+    CampaignPlan plan = runs_of_filters(8);
+    plan.gyros = gyros;
+    plan.keeps_covariance = true;
+    for (const RunRecord& its : performed(plan, 1, two_or_three)) {
+      const std::size_t has = its.draws[0] > 2.5 ? 3 : 2;
+      const std::size_t measured = std::min(gyros, has);
+      for (const RunQuantityRow& row : kRunQuantityRows) {
+        if (plan.has(row.quantity)) {
+          EXPECT_EQ(its[row.quantity].size(), size_of(row.shape, gyros)) << row.name;
+        }
+      }
+      EXPECT_EQ(its.at(RunQuantity::kNeesFreedom), 10.0 * static_cast<double>(measured));
+      EXPECT_EQ(its.at(RunQuantity::kNisFreedom), 2.0 * static_cast<double>(has));
+      EXPECT_EQ(std::isnan(its.at(RunQuantity::kDriftError, 7 * gyros - 1)), has < gyros);
+      EXPECT_EQ(std::isnan(its.at(RunQuantity::kAlignmentSigma, 3 * gyros - 1)), has < gyros);
+      const std::size_t last = 10 * measured - 1;
+      EXPECT_EQ(std::sqrt(its.at(RunQuantity::kCovariance, last * 10 * gyros + last)),
+                its.at(RunQuantity::kAlignmentSigma, 3 * measured - 1));
+    }
+  }
+}
+
+TEST(CampaignOfFilters, AFailureOfTheFilterAloneIsThatOfTheCampaign) {
+  const auto without_fixes = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = flight_of_eq1(seed, draws);
+    setup.scenario.star_tracker.dropout_probability = 1;
+    return setup;
+  };
+  bool was_flown = false;
+  const RunRecord its = perform(runs_of_filters(8), 3, without_fixes, [&](Flight&&) { was_flown = true; });
+  expect_same(its, perform(runs_of_filters(8), 3, without_fixes));
+  EXPECT_EQ(its.outcome, RunOutcome::kFailed);
+  EXPECT_FALSE(was_flown);
+  const RunRecord right = perform(runs_of_filters(8), 3, flight_of_eq1, [&](Flight&&) { was_flown = true; });
+  expect_same(right, perform(runs_of_filters(8), 3, flight_of_eq1));
+  EXPECT_TRUE(was_flown);
+}
+
 TEST(CampaignOfFilters, RunsThatFailAreRowsAmongTheOthers) {
   const auto some_fail = [](std::uint64_t seed, std::span<const double> draws) {
     RunSetup setup = flight_of_eq1(seed, draws);

@@ -344,8 +344,8 @@ void add_campaign(CLI::App& program, const Common& common, int& exit_status) {
   CLI::Option* serve =
       command
           ->add_flag("--serve", arguments->serve,
-                     "Perform the runs whose numbers come on standard input, one a line, and print the "
-                     "digest of the campaign and the record of each run, as the journal has it")
+                     "Perform the runs whose numbers come on standard input, those on a line together, and print "
+                     "the digest of the campaign and the record of each run, as the journal has it")
           ->excludes(out)
           ->excludes(resume)
           ->excludes(only)

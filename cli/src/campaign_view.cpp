@@ -350,7 +350,9 @@ std::string run_text(const CampaignPlan& plan, const RunRecord& record) {
     text += fmt::format("NEES        {} of {:.0f}; NIS {:.3f}\n", three_digits(record.at(RunQuantity::kNees)),
                         record.at(RunQuantity::kNeesFreedom), record.at(RunQuantity::kNisMean));
     for (const Measure& measure : campaign::measures()) {
-      text += fmt::format("  {:<48}{}\n", measure.label, right(measure_text(measure, measure.of(record)), 11));
+      if (const double value = measure.of(record); plan.work == CampaignWork::kCalibrate || !std::isnan(value)) {
+        text += fmt::format("  {:<48}{}\n", measure.label, right(measure_text(measure, value), 11));
+      }
     }
   }
   return text;

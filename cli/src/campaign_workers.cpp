@@ -242,7 +242,7 @@ void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const
   for (std::string line; std::getline(std::cin, line);) {
     const std::vector<std::uint64_t> runs = numbers(line);
     if (runs.empty() || std::ranges::any_of(runs, [&](std::uint64_t run) { return run >= file.plan().runs; })) {
-      throw io::UsageError(fmt::format("--serve: \"{}\" is no number of a run, 0 to {}", line, file.plan().runs - 1));
+      throw io::UsageError(fmt::format("--serve: \"{}\" are no numbers of runs, 0 to {}", line, file.plan().runs - 1));
     }
     std::vector<RunRecord> records;
     ground::with_cores(1, [&] { records = campaign::perform_together(file.plan(), runs, setup_of); });

@@ -383,6 +383,8 @@ TRIHEDRON_INLINE M3 sum_across(const V3 (&h_c)[kGyros]) {
 /// core/directions_fit.hpp.
 void fit(const Filter& filter, const Fit& its, const V3 (&at)[kGyros], FittedReadings& fitted) {
   constexpr int kFitted = 3 * kGyros + 1;
+  const V3 normal = cross(filter.gyro[0].C_c_b * at[0], filter.gyro[1].C_c_b * at[1]);
+  fitted.sine_square = dot(normal, normal);
   fitted.is_explained = V{};
   fitted.noise_factor = all(1);
   fitted.rate_c = zero3();
@@ -587,13 +589,15 @@ void follow_alignments(Filter& filter, const FittedReadings& readings) {
 
 constexpr double kHoldSecondOrder_s = 30;
 
-void look_at_second_order(Filter& filter, const V3& rate_c) {
-  const V interval_s = filter.time_since_fix_s;
-  const V hold_s = filter.second_order_hold_s - interval_s;
+/// In single precision, as there: with dropouts times come to be just as long as one of the bounds.
+void look_at_second_order(Filter& filter, const V3& rate_as_read_c) {
+  const V interval_s = as_float(filter.time_since_fix_s);
+  const V hold_s = float_difference(filter.second_order_hold_s, interval_s);
+  const V3 rate_c = {as_float(rate_as_read_c.x), as_float(rate_as_read_c.y), as_float(rate_as_read_c.z)};
   const V3 apart = rate_c - filter.second_order_rate_c;
   const V3& rate = filter.second_order_rate_c;
   const Mask holds = (hold_s > 0) & (hold_s <= kHoldSecondOrder_s) &
-                     (interval_s <= 1.5 * filter.second_order_interval_s) &
+                     (interval_s <= as_float(1.5 * filter.second_order_interval_s)) &
                      (root(dot(apart, apart)) < 0.5 * root(dot(rate, rate)));
   filter.second_order_hold_s = select(holds, hold_s, V{});
   filter.second_order_interval_s = select(holds, filter.second_order_interval_s, interval_s);
@@ -890,6 +894,7 @@ void begin_fix(Filter& filter, Fix& fix) {
   M3 by_gyros;
   M3 covariance_rad2;
   put_attitude(filter, readings, by_gyros, covariance_rad2);
+  fix.apart_rad = root(larger(3 - trace(transposed(by_gyros) * fix.C_in_c), V{}));
   const M3 C_linear = fused_attitude(by_gyros, covariance_rad2, fix.C_in_c, R_rad2);
   put_reading_noise(filter, C_linear, readings.noise_factor, noise_rad);
   judge(filter, C_linear, R_rad2, noise_rad, fix);

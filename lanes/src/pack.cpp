@@ -12,6 +12,7 @@
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/jitter.hpp"
 #include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/core/readings.hpp"
 #include "trihedron/ground/choose/settled.hpp"
 #include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/records/stop.hpp"
@@ -92,6 +93,11 @@ class FitOfTimes {
  private:
   Fit fit_;
   std::vector<std::array<double, kTerms>> powers_;
+};
+
+/// The readings of a sample.
+struct Kept {
+  V3 h_b[kGyros];
 };
 
 /// The true attitude and momenta of all lanes, and what the gyros read of them.
@@ -287,6 +293,16 @@ void Simulation::make_noise() {
   noise_used_ = 0;
 }
 
+/// The readings of samples, counted from that of a fix.
+struct SamplesAround {
+  const Kept* of_fix;
+  int first;
+  int last;
+  Duration period;
+
+  [[nodiscard]] const V3* at(int sample) const { return of_fix[sample].h_b; }
+};
+
 /// The filters of all lanes.
 class Filters {
  public:
@@ -294,7 +310,10 @@ class Filters {
 
   void predict(const V3 (&h_b)[kGyros], double dt_s);
   /// The fixes of a time, with the readings around it.
-  void fix(Time t, const Fit& fit, const V3 (&at)[kGyros], const M3& truth);
+  void fix(Time t, const Fit& fit, const SamplesAround& samples, const M3& truth);
+  /// What has to be flown alone since the pass ends so.
+  void end(Time t);
+  [[nodiscard]] bool have_all_left() const;
 
   [[nodiscard]] std::optional<FilterResult> result(std::size_t i) const;
 
@@ -310,10 +329,13 @@ class Filters {
     FilterResult result;
   };
 
-  [[nodiscard]] static const StarFix* next_fix(const Lane& lane, State& its, Time t, StarFix& fix);
+  [[nodiscard]] static bool take_fix(const Lane& lane, State& its, Time t, StarFix& fix);
+  [[nodiscard]] bool uses_both_readings(std::size_t i, Time t, const SamplesAround& samples) const;
   void start(std::size_t i, const StarFix& fix, const Fix& all);
   void load(std::size_t i, const Fix& all);
+  void leave_by_time_or_geometry(std::size_t i, Time t);
   void judge(std::size_t i, Time t, Fix& fix);
+  void leave_by_drift();
 
   std::span<Lane* const> lanes_;
   const Kernels& kernels_;
@@ -353,15 +375,37 @@ void Filters::predict(const V3 (&h_b)[kGyros], double dt_s) {
   }
 }
 
-/// That of the lane at this time, if there is one.
-const StarFix* Filters::next_fix(const Lane& lane, State& its, Time t, StarFix& fix) {
+/// That of the lane at this time; false where there is none.
+bool Filters::take_fix(const Lane& lane, State& its, Time t, StarFix& fix) {
   const StarTrackerTelemetry& fixes = lane.fixes;
   if (its.has_left || its.next_fix >= fixes.t.size() || fixes.t[its.next_fix] != t) {
-    return nullptr;
+    return false;
   }
   fix.t = t;
   fix.q_in_c = fixes.q_in_c[its.next_fix++];
-  return &fix;
+  return true;
+}
+
+/// Where no polynomial explains the samples around a fix: whether the reading of neither gyro is left out as a spike.
+bool Filters::uses_both_readings(std::size_t i, Time t, const SamplesAround& samples) const {
+  const Lane::Estimator& estimator = *lanes_[i]->estimator;
+  Lane::Estimator::Gyros gyros = estimator.prior_gyros();
+  Readings<kGyros> readings(estimator.setup(), true);
+  for (int k = 0; k < kGyros; ++k) {
+    gyros[k].h_in = vector_of(filter_->gyro[k].h_in, i);
+    gyros[k].C_c_b = matrix_of(filter_->gyro[k].C_c_b, i);
+  }
+  for (int sample = samples.first; sample <= samples.last; ++sample) {
+    GyroSample its;
+    its.t = t + sample * samples.period;
+    for (int k = 0; k < kGyros; ++k) {
+      its.h_b[k] = vector_of(samples.at(sample)[k], i);
+    }
+    readings.push(its);
+  }
+  const GyroHealth<kGyros> health(kGyros);
+  const auto at = readings.at(t, estimator.setup(), health, gyros);
+  return at && at->used[0] && at->used[1];
 }
 
 /// The first fix of a lane, by its own estimator.
@@ -410,16 +454,29 @@ void Filters::load(std::size_t i, const Fix& all) {
   }
 }
 
-/// Whether the gate takes the fix of a lane. It leaves where more than that happens.
+/// In an outage of the star tracker the angles between the momenta would be used; momenta that come near to one line
+/// give no attitude.
+void Filters::leave_by_time_or_geometry(std::size_t i, Time t) {
+  constexpr double kLeastSine = 2 * kMinSine;
+  State& its = states_[i];
+  const Duration longest = lanes_[i]->estimator->setup().angles_after;
+  const bool is_late = its.has_started && longest != CalibrationSetup::kNever && t - its.used_t >= longest;
+  its.has_left = its.has_left || is_late || !(fix_->readings.sine_square[i] > kLeastSine * kLeastSine);
+}
+
+/// Whether the gate takes the fix of a lane. It leaves where more than that happens: after so many rejections it would
+/// matter that the gate is not told whether the gyros contradict each other. Nor is a fix that is far off compared
+/// exactly.
 void Filters::judge(std::size_t i, Time t, Fix& fix) {
-  constexpr int kMostRejections = 3;
+  constexpr double kFarthest_rad = 0.1;
   State& its = states_[i];
   const CalibrationSetup& setup = lanes_[i]->estimator->setup();
   const double nis = fix.nis[i];
   const FixStatus status = its.gate.judge(setup, nis, fix.misfit_rad[i]);
   const bool is_used = status == FixStatus::kUsed;
-  const bool is_rejected = status == FixStatus::kRejectedByGate && its.gate.rejections_in_a_row() <= kMostRejections;
-  its.has_left = !(is_used || is_rejected) || !std::isfinite(nis);
+  const bool is_rejected =
+      status == FixStatus::kRejectedByGate && its.gate.rejections_in_a_row() + 1 < setup.reopen_after_rejections;
+  its.has_left = !(is_used || is_rejected) || !std::isfinite(nis) || !(fix.apart_rad[i] < kFarthest_rad);
   fix.is_used[i] = is_used ? 1 : 0;
   ++its.result.fixes_judged;
   its.result.nis_sum_of_judged += nis;
@@ -430,18 +487,21 @@ void Filters::judge(std::size_t i, Time t, Fix& fix) {
   }
 }
 
-void Filters::fix(Time t, const Fit& fit, const V3 (&at)[kGyros], const M3& truth) {
+void Filters::fix(Time t, const Fit& fit, const SamplesAround& samples, const M3& truth) {
   Fix& all = *fix_;
-  kernels_.fit(*filter_, fit, at, all.readings);
+  kernels_.fit(*filter_, fit, samples.of_fix->h_b, all.readings);
   V is_corrected{};
   V counts{};
   bool corrects_all = lanes_.size() == kWidth;
   for (std::size_t i = 0; i < lanes_.size(); ++i) {
     State& its = states_[i];
-    // An outage of the star tracker, in which the angles between the momenta would be used.
-    its.has_left = its.has_left || (its.has_started && t - its.used_t > lanes_[i]->estimator->setup().angles_after);
+    leave_by_time_or_geometry(i, t);
     StarFix fix;
-    const bool has_fix = next_fix(*lanes_[i], its, t, fix) != nullptr;
+    const bool has_fix = take_fix(*lanes_[i], its, t, fix);
+    if (has_fix && !(all.readings.is_explained[i] > 0) && !uses_both_readings(i, t, samples)) {
+      its.has_left = true;
+      continue;
+    }
     put(fix.q_in_c.normalized().toRotationMatrix(), i, all.C_in_c);
     if (has_fix) {
       const FittedReadings& readings = all.readings;
@@ -470,6 +530,33 @@ void Filters::fix(Time t, const Fit& fit, const V3 (&at)[kGyros], const M3& trut
   if (!corrects_all) {
     kernels_.blend(*filter_, *before_, is_corrected);
   }
+  leave_by_drift();
+}
+
+/// Where the estimates turn a momentum by more than is exact.
+void Filters::leave_by_drift() {
+  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    for (const Gyro& gyro : filter_->gyro) {
+      double most_rad_s = 0;
+      for (const V& kappa : gyro.kappa_rad_s) {
+        most_rad_s += std::abs(kappa[i]);
+      }
+      const double most_rad = most_rad_s * to_seconds(lanes_[i]->scenario->gyro_period);
+      states_[i].has_left = states_[i].has_left || !(most_rad < kLittle_rad);
+    }
+  }
+}
+
+/// Angles would be used as well if they are due before the last samples.
+void Filters::end(Time t) {
+  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    leave_by_time_or_geometry(i, t - 3 * reach_);
+  }
+}
+
+bool Filters::have_all_left() const {
+  return std::all_of(states_.begin(), states_.begin() + static_cast<std::ptrdiff_t>(lanes_.size()),
+                     [](const State& its) { return its.has_left; });
 }
 
 std::optional<FilterResult> Filters::result(std::size_t i) const {
@@ -562,6 +649,7 @@ bool Lane::is_like(const Lane& other) const {
 
 std::vector<std::optional<FilterResult>> fly_pack(std::span<Lane* const> lanes, const Kernels& kernels) {
   constexpr std::size_t kKept = 256;  // samples
+  static_assert(kKept > 2 * Readings<kGyros>::kCapacity);
   const Scenario& scenario = *lanes.front()->scenario;
   const CalibrationSetup& setup = lanes.front()->estimator->setup();
   const double period_s = to_seconds(scenario.gyro_period);
@@ -571,9 +659,6 @@ std::vector<std::optional<FilterResult>> fly_pack(std::span<Lane* const> lanes, 
   Simulation simulation(lanes, kernels);
   Filters filters(lanes, kernels);
   // Twice, so that those around any sample lie one after the other.
-  struct Kept {
-    V3 h_b[kGyros];
-  };
   std::vector<Kept> kept(2 * kKept);
   std::vector<M3> truth(kKept);  // at fixes
   const auto at = [&](int sample) { return static_cast<std::size_t>(sample) % kKept; };
@@ -603,9 +688,16 @@ std::vector<std::optional<FilterResult>> fly_pack(std::span<Lane* const> lanes, 
       fit_first = first;
       fit_last = last;
     }
-    const Kept* samples_around = &kept[at(i + first)];
-    filters.fix(scenario.epoch + i * scenario.gyro_period, fit->through(&samples_around->h_b), its.h_b, truth[at(i)]);
+    // All that the on-board step keeps.
+    const int kept_before = std::min(i, Readings<kGyros>::kCapacity - 1 - last);
+    const Kept* of_fix = &kept[at(i - kept_before) + static_cast<std::size_t>(kept_before)];
+    filters.fix(scenario.epoch + i * scenario.gyro_period, fit->through(&of_fix[first].h_b),
+                {of_fix, -kept_before, last, scenario.gyro_period}, truth[at(i)]);
+    if (filters.have_all_left()) {
+      break;
+    }
   }
+  filters.end(scenario.epoch + (samples - 1) * scenario.gyro_period);
   std::vector<std::optional<FilterResult>> results;
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     results.push_back(filters.result(i));

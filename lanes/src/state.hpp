@@ -1,6 +1,6 @@
 #pragma once
-/// What the kernels work on: each number is that of eight flights side by side. Plain data, so that a source compiled
-/// for one kind of processor shares no function with those compiled for any.
+/// What the kernels work on: each number is that of eight flights side by side (core/lanes.hpp has two gyros of one).
+/// Plain data, so that a source compiled for one kind of processor shares no function with those compiled for any.
 
 namespace trihedron::lanes {
 
@@ -139,6 +139,7 @@ struct FittedReadings {
   V3 rate_c;
   V noise_factor;
   V is_explained;  ///< 1 or 0; where 0, the rest is of the sample itself
+  V sine_square;   ///< of the angle between the momenta, by the readings
   V unfollowed_square_rad2;
   V unfollowed_sigma_rad2;
 };
@@ -151,7 +152,8 @@ struct Fix {
   V rows[kComponents * kColumns];
   V nis;
   V misfit_rad;
-  V is_used;  ///< 1 or 0
+  V apart_rad;  ///< from the attitude by the gyros
+  V is_used;    ///< 1 or 0
   M3 attitude;
   V3 sigma_rad;
 };

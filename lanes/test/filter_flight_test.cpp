@@ -121,6 +121,59 @@ TEST(Lanes, GiveWhatTheOnBoardStepGivesWhateverIsMet) {
   EXPECT_LT(result_of(all[2]).fixes_used, result_of(all[2]).fixes_judged);
 }
 
+/// By lanes or, where they cannot, alone: what the on-board step gives.
+void expect_as_on_board(const FilterFlight& flight) {
+  const FilterResult its = result_of(fly({&flight, 1}).front());
+  const FilterResult alone = fly_alone(flight);
+  EXPECT_LT(apart(its, alone), 1e-6);
+  EXPECT_EQ(its.fixes_used, alone.fixes_used);
+  EXPECT_NEAR(its.nis_sum_of_judged, alone.nis_sum_of_judged, 1e-5 * alone.nis_sum_of_judged);
+}
+
+TEST(Lanes, LeaveOutTheReadingsThatTheOnBoardStepLeavesOut) {
+  FilterFlight shaken = plain_flight(1, std::chrono::minutes(10));
+  shaken.scenario.attitude.jitter_bandwidth_hz = 1;
+  expect_as_on_board(shaken);
+  FilterFlight fast = plain_flight(2, std::chrono::minutes(10));
+  fast.scenario.attitude.max_slew_rate_rad_s = 5 * kDegree;
+  fast.scenario.attitude.max_slew_acceleration_rad_s2 = 2 * kDegree;
+  expect_as_on_board(fast);
+}
+
+TEST(Lanes, HaveNoAttitudeOfMomentaNearlyOnOneLine) {
+  FilterFlight flight = plain_flight(1, std::chrono::minutes(10));
+  flight.scenario.gyros[1].start_direction_c = {0.993, 0.11, 0.06};
+  flight.scenario.gyros[0].start_direction_c = {0.995, 0.06, 0.045};
+  expect_as_on_board(flight);
+}
+
+TEST(Lanes, DecideAsTheOnBoardStepAtAnyPeriod) {
+  for (const int period_ms : {80, 100, 200, 300, 500}) {
+    SCOPED_TRACE(period_ms);
+    FilterFlight flight = plain_flight(1, std::chrono::minutes(30));
+    flight.scenario.gyro_period = std::chrono::milliseconds(period_ms);
+    flight.scenario.star_tracker_period = std::chrono::milliseconds(3000 / period_ms * period_ms);
+    flight.scenario.star_tracker.dropout_probability = 0.4;
+    ASSERT_TRUE(goes_in_lanes(flight));
+    expect_as_on_board(flight);
+  }
+}
+
+TEST(Lanes, SeeThatAnglesAreDueBetweenTheLastFixAndTheEnd) {
+  FilterFlight flight = plain_flight(1, std::chrono::seconds(625));
+  flight.scenario.star_tracker_period = std::chrono::seconds(30);
+  flight.options.angles_after = std::chrono::seconds(30);
+  flight.scenario.star_tracker.outages = {{571, 700}};
+  expect_as_on_board(flight);
+}
+
+TEST(Lanes, CompareOutliersOfAnySizeAsTheOnBoardStep) {
+  FilterFlight flight = plain_flight(1, std::chrono::minutes(20));
+  flight.scenario.star_tracker.outlier_probability = 0.05;
+  flight.scenario.star_tracker.outlier_rad = 170 * kDegree;
+  expect_as_on_board(flight);
+}
+
 TEST(Lanes, AFlightOnWhichTheFilterBeginsAnewIsFlownAlone) {
   FilterFlight flight = plain_flight(1, std::chrono::minutes(40));
   flight.scenario.star_tracker.inertial_step_rad = {2 * kDegree, 0, 0};
@@ -158,6 +211,7 @@ TEST(Lanes, AreForAPairWithEq1AndNothingElse) {
       [](FilterFlight& its) { its.scenario.gyros[1].drift.warm_up_fraction = 0.1; },
       [](FilterFlight& its) { its.scenario.gyros[1].readout.quantum_rad = 1e-6; },
       [](FilterFlight& its) { its.scenario.gyros[1].mounting_change.step_rad.x() = 1e-5; },
+      [](FilterFlight& its) { its.scenario.attitude.jitter_rad = 1 * kDegree; },
       [](FilterFlight& its) { its.scenario.star_tracker_period = std::chrono::seconds(1); },
       [](FilterFlight& its) { its.scenario.gyro_period = std::chrono::milliseconds(1000); },
       [](FilterFlight& its) { its.options.estimator = Estimator::kPaper; },

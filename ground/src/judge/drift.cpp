@@ -228,7 +228,8 @@ void judge_field_or_error(const CalibrationRun& run, std::vector<Finding>& findi
         "ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}", *error_over_field));
   }
   if (either && either->field_by_angle < kSureOfOrbit) {
-    is_warning = is_warning && either->field_by_angle > -kSureOfOrbit;
+    const bool is_likelier = either->error - either->field > kSureOfOrbit;
+    is_warning = is_warning && either->field_by_angle > -kSureOfOrbit && !is_likelier;
     evidence.push_back(
         fmt::format("ln of the odds of the drift {:+.1f}, of such an error {:+.1f}; of drift as large by the angle "
                     "between the momenta, which the gyros read without the star tracker, {:+.1f}",

@@ -287,6 +287,18 @@ TEST(Verdict, ForbidsDriftOutsideEq1ThatWouldMoveTheAngleBetweenTheMomenta) {
   EXPECT_THAT(found.findings[0].evidence, HasSubstr("-7.0"));
 }
 
+TEST(Verdict, ForbidsDriftOutsideEq1WhereAnErrorOfTheStarTrackerIsLikelier) {
+  auto run = good_run();
+  run.field_or_error = {.field = 300, .error = 304, .field_by_angle = -1};
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.field_or_error->error = 306;
+  const Verdict found = judge(good_pass(), run);
+  ASSERT_THAT(codes(found), ElementsAre("orbital-error-or-drift"));
+  EXPECT_FALSE(found.trustworthy);
+  run.field_or_error->field_by_angle = 6;  // the angle shows the drift
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+}
+
 TEST(Verdict, TellsOfPolhodesAndOfPeriodsThatMayBeThoseOfTheOrbit) {
   auto run = good_run();
   run.options.orbital_rate_rad_s = 2 * std::numbers::pi / 6000;

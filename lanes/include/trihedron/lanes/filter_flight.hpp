@@ -49,15 +49,15 @@ using FilterOutcome = std::variant<FilterResult, FilterFailure>;
 /// The same by the on-board step, from a whole simulated pass. Throws std::invalid_argument and ground::SetupError.
 [[nodiscard]] FilterResult fly_alone(const FilterFlight& flight);
 
-/// Whether flights of this kind go side by side: a pair with eq. (1), without faults of the gyros, drift that changes
-/// or drift that eq. (1) does not contain. Throws as fly_alone().
+/// Whether flights of this kind go side by side (docs/campaign.md, "The filter alone"), by scenario and options. One
+/// that does may still meet what the lanes do not have. Throws as fly_alone().
 [[nodiscard]] bool goes_in_lanes(const FilterFlight& flight);
 
 /// Flights that fill the lanes of one thread.
 inline constexpr std::size_t kTogether = 8;
 
 /// One outcome for each, in their order. Those that go side by side do, and their results are the same whatever goes
-/// beside them; to rounding, some 1e-6 of a sigma, they are those of fly_alone(), by which all others are flown: also
+/// beside them; to rounding, 1e-6 of a sigma, they are those of fly_alone(), by which all others are flown: also
 /// those on the way of which something happens that a filter meets seldom, as that it begins anew.
 [[nodiscard]] std::vector<FilterOutcome> fly(std::span<const FilterFlight> flights);
 
