@@ -135,43 +135,104 @@ TRIHEDRON_INLINE Quaternion small_turn_of_half(const V3& half) {
   return {(1 + x * (-1.0 / 6 + x * (1.0 / 120))) * half, 1 + x * (-1.0 / 2 + x * (1.0 / 24 - x * (1.0 / 720)))};
 }
 
+TRIHEDRON_INLINE int interval_of(double position, int last) {
+  const int interval = static_cast<int>(position);
+  return interval < 0 ? 0 : interval > last ? last : interval;
+}
+
+/// Of the ends of an interval of a cubic spline, and of the second derivatives there; `b`: the part of it that is past.
+template <class S>
+struct SplineWeights {
+  S a, b, a3, b3;
+};
+template <class S>
+TRIHEDRON_INLINE SplineWeights<S> spline_weights(S b, S spacing_s) {
+  const S a = 1 - b;
+  const S by_second = spacing_s * spacing_s * (1.0 / 6);
+  return {a, b, by_second * (a * a * a - a), by_second * (b * b * b - b)};
+}
+
+/// Of six coefficients of a B-spline of degree 5.
+constexpr int kKnots = 6;
+template <class S>
+TRIHEDRON_INLINE void put_spline_weights(S u, S (&w)[kKnots]) {
+  const S v = 1 - u;
+  const S u2 = u * u;
+  const S v2 = v * v;
+  const auto inner = [](S x) { return 1 + x * (5 + x * (10 + x * (10 + x * (5 - 5 * x)))); };
+  w[0] = (1.0 / 120) * (v2 * v2 * v);
+  w[1] = (1.0 / 120) * inner(v);
+  w[2] = (1.0 / 120) * (66 + u2 * (-60 + u2 * (30 - 10 * u)));
+  w[3] = (1.0 / 120) * (66 + v2 * (-60 + v2 * (30 - 10 * v)));
+  w[4] = (1.0 / 120) * inner(u);
+  w[5] = (1.0 / 120) * (u2 * u2 * u);
+}
+
 TRIHEDRON_INLINE Quaternion reference_at(const Attitude& its, double t_s) {
-  const double position = (t_s - its.begin_s) / its.spacing_s;
-  int i = static_cast<int>(position);
-  i = i < 0 ? 0 : i > its.node_count - 2 ? its.node_count - 2 : i;
-  const double b = position - i;
-  const double a = 1 - b;
-  const double by_second = its.spacing_s * its.spacing_s / 6;
-  const double a3 = by_second * (a * a * a - a);
-  const double b3 = by_second * (b * b * b - b);
-  const SplineNode& before = its.nodes[i];
-  const SplineNode& after = its.nodes[i + 1];
+  const int last = its.node_count - 2;
   V q[4];
-  V square{};
-  for (int k = 0; k < 4; ++k) {
-    q[k] = a * before.value[k] + b * after.value[k] + (a3 * before.second[k] + b3 * after.second[k]);
-    square += q[k] * q[k];
+  if (its.is_together) {
+    const double position = (t_s - its.begin_s[0]) / its.spacing_s[0];
+    const int interval = interval_of(position, last);
+    const SplineWeights<double> w = spline_weights<double>(position - interval, its.spacing_s[0]);
+    const SplineNode* nodes = its.nodes + interval;
+    for (int k = 0; k < 4; ++k) {
+      q[k] =
+          w.a * nodes[0].value[k] + w.b * nodes[1].value[k] + (w.a3 * nodes[0].second[k] + w.b3 * nodes[1].second[k]);
+    }
+  } else {
+    V position = (t_s - its.begin_s) / its.spacing_s;
+    SplineNode nodes[2];
+    for (int i = 0; i < kWidth; ++i) {
+      const int interval = interval_of(position[i], last);
+      position[i] -= interval;
+      for (int end = 0; end < 2; ++end) {
+        for (int k = 0; k < 4; ++k) {
+          nodes[end].value[k][i] = its.nodes[interval + end].value[k][i];
+          nodes[end].second[k][i] = its.nodes[interval + end].second[k][i];
+        }
+      }
+    }
+    const SplineWeights<V> w = spline_weights<V>(position, its.spacing_s);
+    for (int k = 0; k < 4; ++k) {
+      q[k] =
+          w.a * nodes[0].value[k] + w.b * nodes[1].value[k] + (w.a3 * nodes[0].second[k] + w.b3 * nodes[1].second[k]);
+    }
   }
-  const V by = 1 / root(square);
+  const V by = 1 / root((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
   return {{by * q[0], by * q[1], by * q[2]}, by * q[3]};
 }
 
 /// sim::SmoothNoise.
 TRIHEDRON_INLINE V3 jitter_at(const Attitude& its, double t_s) {
-  const double position = (t_s - its.jitter_begin_s) * its.jitter_knots_per_s;
-  int i = static_cast<int>(position);
-  i = i < 0 ? 0 : i > its.jitter_count - 6 ? its.jitter_count - 6 : i;
-  const double u = position - i;
-  const double v = 1 - u;
-  const double u2 = u * u;
-  const double v2 = v * v;
-  const auto inner = [](double x) { return 1 + x * (5 + x * (10 + x * (10 + x * (5 - 5 * x)))); };
-  const double w[6] = {
-      v2 * v2 * v, inner(v),   66 + u2 * (-60 + u2 * (30 - 10 * u)), 66 + v2 * (-60 + v2 * (30 - 10 * v)),
-      inner(u),    u2 * u2 * u};
+  const int last = its.jitter_count - kKnots;
   V3 sum = zero3();
-  for (int k = 0; k < 6; ++k) {
-    sum = sum + all(w[k] / 120) * its.jitter[i + k];
+  if (its.is_together) {
+    const double position = (t_s - its.jitter_begin_s[0]) * its.jitter_knots_per_s;
+    const int interval = interval_of(position, last);
+    double w[kKnots];
+    put_spline_weights<double>(position - interval, w);
+    for (int k = 0; k < kKnots; ++k) {
+      sum = sum + all(w[k]) * its.jitter[interval + k];
+    }
+  } else {
+    V position = (t_s - its.jitter_begin_s) * its.jitter_knots_per_s;
+    V3 coefficients[kKnots];
+    for (int i = 0; i < kWidth; ++i) {
+      const int interval = interval_of(position[i], last);
+      position[i] -= interval;
+      for (int k = 0; k < kKnots; ++k) {
+        const V3& of_flight = its.jitter[interval + k];
+        coefficients[k].x[i] = of_flight.x[i];
+        coefficients[k].y[i] = of_flight.y[i];
+        coefficients[k].z[i] = of_flight.z[i];
+      }
+    }
+    V w[kKnots];
+    put_spline_weights<V>(position, w);
+    for (int k = 0; k < kKnots; ++k) {
+      sum = sum + w[k] * coefficients[k];
+    }
   }
   return its.jitter_rad * sum;
 }

@@ -154,41 +154,51 @@ Simulation::Simulation(std::span<Lane* const> lanes, const Kernels& kernels)
 }
 
 void Simulation::put_reference() {
-  const sim::AttitudeSpline& first = *lanes_.front()->attitude.reference();
-  const std::size_t count = first.values().size();
-  nodes_.resize(count);
+  std::size_t most = 0;
+  for (const Lane* its : lanes_) {
+    most = std::max(most, its->attitude.reference()->values().size());
+  }
+  nodes_.resize(most);
   for (std::size_t i = 0; i < kWidth; ++i) {
     const sim::AttitudeSpline& its = *lane(i).attitude.reference();
+    const std::size_t count = its.values().size();
     for (std::size_t node = 0; node < count; ++node) {
       for (int k = 0; k < 4; ++k) {
         put(its.values()[node](k), i, nodes_[node].value[k]);
         put(its.second_derivatives()[node](k), i, nodes_[node].second[k]);
       }
     }
+    attitude_.begin_s[i] = its.begin_s();
+    attitude_.spacing_s[i] = (its.end_s() - its.begin_s()) / static_cast<double>(count - 1);
+    attitude_.is_together = attitude_.is_together && attitude_.begin_s[i] == attitude_.begin_s[0] &&
+                            attitude_.spacing_s[i] == attitude_.spacing_s[0];
   }
   attitude_.nodes = nodes_.data();
-  attitude_.node_count = static_cast<int>(count);
-  attitude_.begin_s = first.begin_s();
-  attitude_.spacing_s = (first.end_s() - first.begin_s()) / static_cast<double>(count - 1);
+  attitude_.node_count = static_cast<int>(most);
 }
 
 void Simulation::put_jitter() {
   if (!lanes_.front()->attitude.jitter()) {
     return;
   }
-  const sim::SmoothNoise& first = *lanes_.front()->attitude.jitter();
-  jitter_.resize(first.coefficients().size());
+  std::size_t most = 0;
+  for (const Lane* its : lanes_) {
+    most = std::max(most, its->attitude.jitter()->coefficients().size());
+  }
+  jitter_.resize(most);
   for (std::size_t i = 0; i < kWidth; ++i) {
     const sim::AttitudeProgramme& its = lane(i).attitude;
-    attitude_.jitter_rad[i] = its.jitter_rad();
-    for (std::size_t knot = 0; knot < jitter_.size(); ++knot) {
-      put(its.jitter()->coefficients()[knot], i, jitter_[knot]);
+    const std::vector<Eigen::Vector3d>& coefficients = its.jitter()->coefficients();
+    for (std::size_t knot = 0; knot < coefficients.size(); ++knot) {
+      put(coefficients[knot], i, jitter_[knot]);
     }
+    attitude_.jitter_rad[i] = its.jitter_rad();
+    attitude_.jitter_begin_s[i] = its.jitter()->begin_s();
+    attitude_.is_together = attitude_.is_together && attitude_.jitter_begin_s[i] == attitude_.jitter_begin_s[0];
   }
   attitude_.jitter = jitter_.data();
-  attitude_.jitter_count = static_cast<int>(jitter_.size());
-  attitude_.jitter_begin_s = first.begin_s();
-  attitude_.jitter_knots_per_s = first.knots_per_s();
+  attitude_.jitter_count = static_cast<int>(most);
+  attitude_.jitter_knots_per_s = lanes_.front()->attitude.jitter()->knots_per_s();
 }
 
 void Simulation::put_gyros() {
@@ -637,12 +647,9 @@ bool Lane::turns_by_little() const {
 
 bool Lane::is_like(const Lane& other) const {
   const auto times = [](const Lane& its) {
-    const sim::AttitudeSpline& reference = *its.attitude.reference();
     const std::optional<sim::SmoothNoise>& jitter = its.attitude.jitter();
     return std::tuple(its.scenario->epoch, its.scenario->duration, its.scenario->gyro_period,
-                      its.scenario->star_tracker_period, reference.begin_s(), reference.end_s(),
-                      reference.values().size(), jitter.has_value(), jitter ? jitter->begin_s() : 0,
-                      jitter ? jitter->knots_per_s() : 0, jitter ? jitter->coefficients().size() : 0);
+                      its.scenario->star_tracker_period, jitter.has_value(), jitter ? jitter->knots_per_s() : 0);
   };
   return times(*this) == times(other);
 }

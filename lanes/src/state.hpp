@@ -53,10 +53,11 @@ struct SplineNode {
 /// The attitude in the making (sim/attitude.hpp): a spline of the reference through nodes at even distances, the turn
 /// that each flight makes or has made, jitter by a B-spline.
 struct Attitude {
+  bool is_together = true;  ///< whether nodes and knots of all flights are at the same times
   const SplineNode* nodes = nullptr;
   int node_count = 0;
-  double begin_s = 0;
-  double spacing_s = 1;
+  V begin_s;
+  V spacing_s;
   /// from exp([s(u) v×]), u = (t − begin) × turns_per_s from 0 to 1.
   V turn_begin_s;
   V turns_per_s;
@@ -64,7 +65,7 @@ struct Attitude {
   V3 turn_rad;
   const V3* jitter = nullptr;  ///< coefficients; null where there is none
   int jitter_count = 0;
-  double jitter_begin_s = 0;
+  V jitter_begin_s;
   double jitter_knots_per_s = 1;
   V jitter_rad;
 };

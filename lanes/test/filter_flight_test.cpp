@@ -85,7 +85,8 @@ std::vector<FilterFlight> various_flights() {
   flights[7].scenario.star_tracker.outages = {{0, 30}, {300, 330}};
   flights[8].scenario.orbit.inclination_rad = 97 * kDegree;
   flights[8].options.direction_random_walk_rad_sqrt_s = 1e-8;
-  flights[9].scenario.star_tracker.clock_offset_s = 0.02;  // its attitude begins at another time
+  flights[9].scenario.star_tracker.clock_offset_s = 0.02;  // its attitude begins at another time, and
+  flights[3].scenario.star_tracker.clock_offset_s = -2.5;  // with more nodes and knots
   flights[10].scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
   return flights;
 }
