@@ -183,7 +183,8 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
       fmt::format(
           "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
           "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
-          "separated from its initial direction. {} The attitude does not suffer from that while the flight stays steady.",
+          "separated from its initial direction. {} The attitude does not suffer from that while the flight stays "
+          "steady.",
           axis.x(), axis.y(), axis.z(),
           believes ? "Estimator paper takes noise for information there: its sigmas about this axis are too small."
                    : "The sigmas say so."),
