@@ -338,6 +338,9 @@ def test_runs_of_filters_are_the_same_together_and_alone(tmp_path):
     text = run("campaign", tmp_path / "c.toml", "-o", tmp_path / "one", "--jobs", "1").stdout
     assert "20 trustworthy" in text and "NEES" in text and "Correction interval" not in text and "settled" not in text
     run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "two", "--jobs", "2")
+    page = (tmp_path / "one" / "report.html").read_text()
+    shown = page[page.index("<main"):page.index("</main")]
+    assert "the filter alone" in page and "Attitude of the calibration, rms" in shown and "extension" not in shown.lower()
     assert table(tmp_path / "one") == table(tmp_path / "two")
     with xarray.open_dataset(tmp_path / "one" / "runs.nc") as runs:
         assert "open_loop_error" not in runs and (runs.nees > 0).all() and (runs.nees_degrees_of_freedom == 20).all()

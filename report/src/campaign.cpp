@@ -141,23 +141,35 @@ json numbers_of_campaign(const CampaignReportInput& input) {
                                                static_cast<double>(std::max<std::size_t>(input.records.size(), 1)),
                                            3));
   };
-  return {{{"name", "Trustworthy"},
-           {"value", number(static_cast<double>(summary.count(RunOutcome::kTrustworthy)), 0)},
-           {"unit", fmt::format(" of {} runs", number(static_cast<double>(input.records.size()), 0))},
-           {"note", share(RunOutcome::kTrustworthy)}},
-          {{"name", "Do not use"},
-           {"value", number(static_cast<double>(summary.count(RunOutcome::kDoNotUse)), 0)},
-           {"unit", " runs"},
-           {"note", share(RunOutcome::kDoNotUse) + ", as the calibrations say themselves"}},
-          {{"name", "Failed"},
-           {"value", number(static_cast<double>(summary.count(RunOutcome::kFailed)), 0)},
-           {"unit", " runs"},
-           {"note", share(RunOutcome::kFailed) + ", in no statistic"}},
-          consistency_number("NEES of the parameters", summary.nees, 1),
-          consistency_number("NIS of the fixes", summary.nis, 3),
-          quantile_number(of_measure(summary.trustworthy, "open_loop_error"), 0.997),
-          quantile_number(of_measure(summary.trustworthy, "alignment_error"), 0.95),
-          quantile_number(of_measure(summary.trustworthy, "extension"), 0.95)};
+  const bool are_filters = input.plan.work == CampaignWork::kFilter;
+  const auto quantile_of_trustworthy = [&](std::string_view key, double p) {
+    return quantile_number(of_measure(summary.trustworthy, key), p);
+  };
+  json rows = {{{"name", "Trustworthy"},
+                {"value", number(static_cast<double>(summary.count(RunOutcome::kTrustworthy)), 0)},
+                {"unit", fmt::format(" of {} runs", number(static_cast<double>(input.records.size()), 0))},
+                {"note", share(RunOutcome::kTrustworthy)}},
+               {{"name", "Do not use"},
+                {"value", number(static_cast<double>(summary.count(RunOutcome::kDoNotUse)), 0)},
+                {"unit", " runs"},
+                {"note", share(RunOutcome::kDoNotUse) +
+                             (are_filters ? ", whose filter began anew" : ", as the calibrations say themselves")}},
+               {{"name", "Failed"},
+                {"value", number(static_cast<double>(summary.count(RunOutcome::kFailed)), 0)},
+                {"unit", " runs"},
+                {"note", share(RunOutcome::kFailed) + ", in no statistic"}},
+               consistency_number("NEES of the parameters", summary.nees, 1),
+               consistency_number("NIS of the fixes", summary.nis, 3)};
+  if (are_filters) {
+    rows.push_back(quantile_of_trustworthy("attitude_rms", 0.95));
+  } else {
+    rows.push_back(quantile_of_trustworthy("open_loop_error", 0.997));
+  }
+  rows.push_back(quantile_of_trustworthy("alignment_error", 0.95));
+  if (!are_filters) {
+    rows.push_back(quantile_of_trustworthy("extension", 0.95));
+  }
+  return rows;
 }
 
 json measure_rows(const std::vector<MeasureStatistics>& statistics) {
@@ -485,7 +497,9 @@ json facts_of_campaign(const CampaignPlan& plan) {
   };
   return {fact("Runs", number(static_cast<double>(plan.runs), 0)), fact("Seed", std::to_string(plan.seed)),
           fact("Sampling", plan.latin_hypercube ? "Latin hypercube" : "random"),
-          fact("Values drawn", std::to_string(plan.inputs.size())), fact("Error limit", limit_text(plan.limit_rad))};
+          fact("Values drawn", std::to_string(plan.inputs.size())),
+          plan.work == CampaignWork::kFilter ? fact("Work", "the filter alone")
+                                             : fact("Error limit", limit_text(plan.limit_rad))};
 }
 
 }  // namespace
@@ -521,6 +535,7 @@ std::string render_campaign(const CampaignReportInput& input) {
                  {"findings", finding_rows(summary.campaign_findings)},
                  {"quantiles", quantile_heads()},
                  {"measures", measure_rows(summary.trustworthy)},
+                 {"has_extension", input.plan.work != CampaignWork::kFilter},
                  {"has_all", summary.count(RunOutcome::kDoNotUse) > 0},
                  {"all", measure_rows(summary.all)},
                  {"watched", watched_text(input)},
