@@ -276,7 +276,7 @@ void find_influences(const CampaignPlan& plan, const Records& records, CampaignS
                            [](const Influence& influence) { return std::abs(influence.correlation.rho); });
 }
 
-GridCell cell_of(std::vector<double> point, std::span<const RunRecord> records) {
+GridCell cell_of(std::vector<double> point, std::span<const RunRecord> records, CampaignWork work) {
   GridCell cell;
   cell.point = std::move(point);
   Records trustworthy;
@@ -289,7 +289,7 @@ GridCell cell_of(std::vector<double> point, std::span<const RunRecord> records) 
   cell.trustworthy = trustworthy.size();
   cell.nees = nees_of(trustworthy);
   cell.nis = nis_of(trustworthy);
-  for (const std::string_view key : kCellMeasures) {
+  for (const std::string_view key : cell_measures(work)) {
     cell.measures.push_back(statistics_of(*std::ranges::find(kMeasures, key, &Measure::key), trustworthy));
   }
   return cell;
@@ -316,7 +316,7 @@ void find_cells(const CampaignPlan& plan, std::span<const RunRecord> records, Ca
     for (const std::size_t input : summary.grid) {
       point.push_back(records[begin].draws[input]);
     }
-    summary.cells.push_back(cell_of(std::move(point), records.subspan(begin, end - begin)));
+    summary.cells.push_back(cell_of(std::move(point), records.subspan(begin, end - begin), plan.work));
     begin = end;
   }
 }
@@ -507,6 +507,13 @@ std::string influential(const CampaignInput& input) {
 }
 
 std::span<const Measure> measures() { return kMeasures; }
+
+std::span<const std::string_view> cell_measures(CampaignWork work) {
+  static constexpr std::array<std::string_view, 3> kOfCalibrations = {"alignment_error", "open_loop_error",
+                                                                      "extension"};
+  static constexpr std::array<std::string_view, 2> kOfFilters = {"alignment_error", "attitude_rms"};
+  return work == CampaignWork::kFilter ? std::span<const std::string_view>(kOfFilters) : kOfCalibrations;
+}
 
 Consistency consistency_of(double sum, double freedom, double count) {
   return {.freedom = freedom / count,

@@ -61,8 +61,10 @@ std::string consistency_text(const char* name, const std::optional<Consistency>&
 
 /// Each quantile, and below it its upper bound.
 std::string measures_text(const std::vector<MeasureStatistics>& statistics, const char* whose) {
-  std::string text = fmt::format(
-      "\nOver the {} runs, not exceeded (intervals and extension: reached) by a share of\n{:<50}", whose, "");
+  const bool some_are_reached = std::ranges::any_of(
+      statistics, [](const MeasureStatistics& its) { return !its.quantiles.empty() && !its.measure->large_is_bad; });
+  std::string text = fmt::format("\nOver the {} runs, not exceeded{} by a share of\n{:<50}", whose,
+                                 some_are_reached ? " (intervals and extension: reached)" : "", "");
   for (const double p : campaign::kReportedQuantiles) {
     text += right(fmt::format("{:g} %", 100 * p), 11);
   }
@@ -104,7 +106,7 @@ std::string cells_text(const CampaignPlan& plan, const CampaignSummary& summary)
   for (const char* const head : {"runs", "trust", "NEES  ", "NIS  "}) {
     rows.front().emplace_back(head);
   }
-  for (const std::string_view key : campaign::kCellMeasures) {
+  for (const std::string_view key : campaign::cell_measures(plan.work)) {
     std::string& head = rows.front().emplace_back(key);
     std::ranges::replace(head, '_', ' ');
   }
@@ -133,8 +135,11 @@ std::string cells_text(const CampaignPlan& plan, const CampaignSummary& summary)
   }
   std::string text = fmt::format(
       "\nBy the grid: means over the trustworthy runs, ↑ ↓ outside of what 95 % of consistent estimators have; errors "
-      "that {0:g} % of the runs do not exceed, extensions that {0:g} % reach\n",
-      100 * campaign::kCellQuantile);
+      "that {0:g} % of the runs do not exceed{1}\n",
+      100 * campaign::kCellQuantile,
+      plan.work == CampaignWork::kFilter
+          ? ""
+          : fmt::format(", extensions that {:g} % reach", 100 * campaign::kCellQuantile));
   for (const std::vector<std::string>& row : rows) {
     for (std::size_t i = 0; i < row.size(); ++i) {
       text += "  " + right(row[i], widths[i]);

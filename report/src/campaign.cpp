@@ -245,9 +245,9 @@ json cell_heads(const CampaignReportInput& input) {
   return heads;
 }
 
-json cell_measures() {
+json labels_of_cells(CampaignWork work) {
   json labels = json::array();
-  for (const std::string_view key : campaign::kCellMeasures) {
+  for (const std::string_view key : campaign::cell_measures(work)) {
     labels.push_back(std::ranges::find(campaign::measures(), key, &Measure::key)->label);
   }
   return labels;
@@ -543,7 +543,7 @@ std::string render_campaign(const CampaignReportInput& input) {
                  {"parameters", parameter_rows(summary)},
                  {"has_cells", !summary.cells.empty()},
                  {"cell_heads", cell_heads(input)},
-                 {"cell_measures", cell_measures()},
+                 {"cell_measures", labels_of_cells(input.plan.work)},
                  {"cells", cell_rows(input)},
                  {"more_cells", summary.cells.size() > kShownCells
                                     ? fmt::format("The first {} of {} points are here; --json has all.", kShownCells,

@@ -117,10 +117,10 @@ struct GridCell {
   std::size_t trustworthy = 0;
   std::optional<Consistency> nees;  ///< of trustworthy runs, as all that follows
   std::optional<Consistency> nis;
-  std::vector<MeasureStatistics> measures;  ///< by kCellMeasures
+  std::vector<MeasureStatistics> measures;  ///< by cell_measures()
 };
-/// Of measures(), those that are shown for each cell.
-inline constexpr std::array<std::string_view, 3> kCellMeasures = {"alignment_error", "open_loop_error", "extension"};
+/// Keys of measures() that are shown for each cell: what runs of this work have.
+[[nodiscard]] std::span<const std::string_view> cell_measures(CampaignWork work);
 /// Quantile of them that is shown.
 inline constexpr double kCellQuantile = 0.95;
 
