@@ -450,14 +450,13 @@ void judge_nees(CampaignWork work, const Records& trustworthy, CampaignSummary& 
   }
   if (!wrong.empty()) {
     const bool are_filters = work == CampaignWork::kFilter;
-    const double share = static_cast<double>(wrong.size()) / static_cast<double>(trustworthy.size());
     summary.campaign_findings.push_back(
         {"trusted-but-wrong",
          fmt::format("{} run{}{} {} errors that {} sigmas rule out.", wrong.size(), wrong.size() == 1 ? "" : "s",
                      are_filters ? "" : " called trustworthy", wrong.size() == 1 ? "has" : "have",
                      wrong.size() == 1 ? "its" : "their"),
-         fmt::format("{:.2g} % of the trustworthy runs have a NEES that chance passes once in a million: runs {}",
-                     100 * share, listed(wrong)),
+         fmt::format("{} of {} trustworthy runs have a NEES that chance passes once in a million: run{} {}",
+                     wrong.size(), trustworthy.size(), wrong.size() == 1 ? "" : "s", listed(wrong)),
          are_filters ? "Look at them with --only: the model of the filter does not hold there."
                      : "Look at them with --only: their verdict missed something.",
          is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse

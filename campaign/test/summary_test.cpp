@@ -177,7 +177,8 @@ TEST(CampaignSummary, NamesRunsThatAreTrustedButWrong) {
   records[17][RunQuantity::kNees] = {100};  // χ² of 20 passes 68 once in a million
   const CampaignSummary summary = summarise(plan_of(800), records);
   EXPECT_THAT(codes_of(summary), testing::ElementsAre("trusted-but-wrong"));
-  EXPECT_THAT(summary.campaign_findings.front().evidence, testing::HasSubstr("runs 17"));
+  EXPECT_THAT(summary.campaign_findings.front().evidence,
+              testing::HasSubstr("1 of 800 trustworthy runs have a NEES that chance passes once in a million: run 17"));
   EXPECT_EQ(summary.worst.front().run, 17U);
 }
 
