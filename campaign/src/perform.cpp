@@ -6,7 +6,6 @@
 #include <ctime>
 #include <limits>
 #include <mutex>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -16,10 +15,10 @@
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/model/reason_of_failure.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/lanes/filter_flight.hpp"
-#include "trihedron/records/stop.hpp"
 
 namespace trihedron::campaign {
 namespace {
@@ -307,22 +306,6 @@ class Begun {
   double cpu_s_ = thread_cpu_s();
 };
 
-/// The record that `work` gives, or that of a run that has failed.
-template <class Work>
-RunRecord unless_it_fails(const CampaignPlan& plan, std::uint64_t run, const Work& work) {
-  try {
-    return work();
-  } catch (const Stopped&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;  // it says nothing of the run
-  } catch (const ground::SetupError& error) {
-    return failed(plan, run, std::string(error.what()) + "; " + error.cure());
-  } catch (const std::exception& error) {
-    return failed(plan, run, error.what());
-  }
-}
-
 /// That of a run, or the record of one whose draws make none.
 std::variant<RunSetup, RunRecord> setup_or_failure(const CampaignPlan& plan, std::uint64_t run,
                                                    const SetupOf& setup_of) {
@@ -333,7 +316,7 @@ std::variant<RunSetup, RunRecord> setup_or_failure(const CampaignPlan& plan, std
   }
 }
 
-void name(const CampaignPlan& plan, std::uint64_t run, RunRecord& record) {
+void identify(const CampaignPlan& plan, std::uint64_t run, RunRecord& record) {
   record.run = run;
   record.seed = seed_of_run(plan, run);
   record.draws = draws_of_run(plan, run);
@@ -397,17 +380,19 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& se
   if (auto* const failure = std::get_if<RunRecord>(&setup)) {
     record = std::move(*failure);
   } else {
-    record = unless_it_fails(plan, run, [&] {
+    const std::optional<std::string> reason = ground::reason_of_failure([&] {
       Flight flight = fly(std::get<RunSetup>(setup), plan.limit_rad,
                           flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
-      RunRecord its = record_of(flight, plan);
+      record = record_of(flight, plan);
       if (flown) {
         flown(std::move(flight));
       }
-      return its;
     });
+    if (reason) {
+      record = failed(plan, run, *reason);
+    }
   }
-  name(plan, run, record);
+  identify(plan, run, record);
   begun.tell({&record, 1});
   return record;
 }
@@ -423,7 +408,7 @@ std::vector<RunRecord> perform_together(const CampaignPlan& plan, std::span<cons
     const Begun begun;
     records = fly_filters(plan, runs, setup_of);
     for (std::size_t i = 0; i < runs.size(); ++i) {
-      name(plan, runs[i], records[i]);
+      identify(plan, runs[i], records[i]);
     }
     begun.tell(records);
   } else {

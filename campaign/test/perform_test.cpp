@@ -77,17 +77,21 @@ void expect_same(const RunRecord& a, const RunRecord& b) {
   }
 }
 
-TEST(Campaign, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
-  const CampaignPlan plan = six_runs();
-  const std::vector<RunRecord> one = performed(plan, 1, short_flight);
-  const std::vector<RunRecord> three = performed(plan, 3, short_flight);
-  ASSERT_EQ(one.size(), 6U);
-  ASSERT_EQ(three.size(), 6U);
+/// The runs on one thread, on three, and one of them alone, to the bit.
+void expect_same_on_threads_and_alone(const CampaignPlan& plan, const SetupOf& setup_of, std::uint64_t alone) {
+  const std::vector<RunRecord> one = performed(plan, 1, setup_of);
+  const std::vector<RunRecord> three = performed(plan, 3, setup_of);
+  ASSERT_EQ(one.size(), plan.runs);
+  ASSERT_EQ(three.size(), plan.runs);
   for (std::size_t i = 0; i < one.size(); ++i) {
     expect_same(one[i], three[i]);
   }
-  expect_same(one[4], perform(plan, 4, short_flight));
+  expect_same(one[alone], perform(plan, alone, setup_of));
   EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
+}
+
+TEST(Campaign, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
+  expect_same_on_threads_and_alone(six_runs(), short_flight, 4);
 }
 
 RunSetup flight_of_eq1(std::uint64_t seed, std::span<const double> draws) {
@@ -106,16 +110,7 @@ CampaignPlan runs_of_filters(std::uint64_t runs) {
 }
 
 TEST(CampaignOfFilters, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
-  const CampaignPlan plan = runs_of_filters(19);
-  const std::vector<RunRecord> one = performed(plan, 1, flight_of_eq1);
-  const std::vector<RunRecord> three = performed(plan, 3, flight_of_eq1);
-  ASSERT_EQ(one.size(), 19U);
-  ASSERT_EQ(three.size(), 19U);
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    expect_same(one[i], three[i]);
-  }
-  expect_same(one[13], perform(plan, 13, flight_of_eq1));
-  EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
+  expect_same_on_threads_and_alone(runs_of_filters(19), flight_of_eq1, 13);
 }
 
 TEST(CampaignOfFilters, MeasuresWhatACalibrationOfTheSameFlightsHas) {

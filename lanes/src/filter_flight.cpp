@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <exception>
 #include <iterator>
 #include <memory>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -16,11 +14,10 @@
 #include "trihedron/core/readings.hpp"
 #include "trihedron/ground/choose/settled.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
-#include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/model/reason_of_failure.hpp"
 #include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/ground/onboard/recorder.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
-#include "trihedron/records/stop.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::lanes {
@@ -78,17 +75,11 @@ std::vector<Eigen::Index> parameters_of(const Calibration& calibration) {
 }
 
 FilterOutcome fly_one(const FilterFlight& flight) {
-  try {
-    return fly_alone(flight);
-  } catch (const Stopped&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;  // it says nothing of the flight
-  } catch (const ground::SetupError& error) {
-    return FilterFailure{std::string(error.what()) + "; " + error.cure()};
-  } catch (const std::exception& error) {
-    return FilterFailure{error.what()};
+  FilterOutcome outcome;
+  if (auto reason = ground::reason_of_failure([&] { outcome = fly_alone(flight); })) {
+    outcome = FilterFailure{std::move(*reason)};
   }
+  return outcome;
 }
 
 }  // namespace
@@ -151,7 +142,8 @@ std::vector<FilterOutcome> fly(std::span<const FilterFlight> flights) {
   std::vector<std::optional<FilterOutcome>> outcomes(flights.size());
   std::vector<std::pair<std::size_t, std::unique_ptr<Lane>>> waiting;
   for (std::size_t i = 0; i < flights.size(); ++i) {
-    try {
+    // One that fails does so once more by itself, which then says why.
+    static_cast<void>(ground::reason_of_failure([&] {
       sim::expect_possible(flights[i].scenario);
       if (goes_in_lanes(flights[i])) {
         const auto before = std::ranges::find_if(
@@ -161,13 +153,7 @@ std::vector<FilterOutcome> fly(std::span<const FilterFlight> flights) {
           waiting.emplace_back(i, std::move(lane));
         }
       }
-    } catch (const Stopped&) {
-      throw;
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception&) {
-      // As by itself, which then says why.
-    }
+    }));
   }
   while (!waiting.empty()) {
     // Those that are like the first, as many as there is room for.
