@@ -25,9 +25,11 @@ def main() -> int:
     parser.add_argument("build", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
+    build = arguments.build.resolve()
     commands = {}
-    for entry in json.loads((arguments.build / "compile_commands.json").read_text()):
-        if entry["file"].endswith(".cpp") and "cmake_pch" not in entry["command"]:
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        # Those in the build directory are written by the build, which has not run.
+        if entry["file"].endswith(".cpp") and not Path(entry["file"]).is_relative_to(build):
             commands.setdefault(entry["file"], entry)
 
     def read(entry: dict[str, str]) -> str:
