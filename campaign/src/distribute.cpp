@@ -7,12 +7,15 @@
 #include <deque>
 #include <map>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "trihedron/campaign/perform.hpp"
 
 namespace trihedron::campaign {
 namespace {
+
+constexpr std::string_view kLost = "ended its process";
 
 /// Who performs what.
 class Assignments {
@@ -67,7 +70,7 @@ class Assignments {
         again_.push_back(run);
       } else {
         records.push_back(
-            failed(plan_, run, fmt::format("ended its process {} times, at last by {}", lost_[run], event.reason)));
+            failed(plan_, run, fmt::format("{} {} times, at last by {}", kLost, lost_[run], event.reason)));
       }
     }
     performed_by_.erase(its);
@@ -103,6 +106,10 @@ class Assignments {
 };
 
 }  // namespace
+
+bool was_lost(const RunRecord& record) {
+  return record.outcome == RunOutcome::kFailed && record.reason.starts_with(kLost);
+}
 
 void distribute(const CampaignPlan& plan, std::span<const std::uint64_t> runs, Workers& workers,
                 const Collect& collect) {

@@ -15,6 +15,7 @@
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/ground/model/reason_of_failure.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
@@ -109,6 +110,12 @@ void measure_parameters(const Flight& flight, const CampaignPlan& plan, RunRecor
   record[RunQuantity::kNees] = {
       ground::normalised_square(flight.evaluation.estimate_minus_truth(rows), calibration.covariance(rows, rows))};
   record[RunQuantity::kNeesFreedom] = {static_cast<double>(rows.size())};
+}
+
+void put_into(std::vector<std::string>& names, const Verdict& verdict) {
+  for (const Finding& finding : verdict.findings) {
+    names.emplace_back(name_of(finding.code));
+  }
 }
 
 void measure_fixes(const CalibrationRun& run, RunRecord& record) {
@@ -213,9 +220,7 @@ RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
   const Calibration& calibration = flight.run.calibration;
   record.outcome = calibration.verdict.trustworthy ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
   record.drift_model = flight.run.options.drift_field ? "field" : name_of(calibration.gyros.front().drift_model);
-  for (const Finding& finding : calibration.verdict.findings) {
-    record.findings.emplace_back(name_of(finding.code));
-  }
+  put_into(record.findings, calibration.verdict);
   measure_parameters(flight, plan, record);
   measure_fixes(flight.run, record);
   measure_attitude(flight.evaluation, record);
@@ -227,6 +232,16 @@ RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
 
 namespace {
 
+/// Of its fixes, the first among them. Those at which the filter began anew count as rejected.
+Statistics statistics_of(const lanes::FilterResult& result) {
+  Statistics statistics;
+  statistics.fixes = static_cast<long>(1 + result.fixes_judged);
+  statistics.fixes_used = static_cast<long>(1 + result.fixes_used);
+  statistics.fixes_rejected_as_outliers = static_cast<long>(result.fixes_judged - result.fixes_used);
+  statistics.reopened = static_cast<long>(result.reopened);
+  return statistics;
+}
+
 /// What fly_filters() makes of a flight, of the gyros of the plan: a run may have more or fewer.
 RunRecord record_of(const lanes::FilterResult& result, const CampaignPlan& plan) {
   const std::size_t gyros = std::min(plan.gyros, static_cast<std::size_t>(result.error.size()) / kCampaignParameters);
@@ -234,10 +249,10 @@ RunRecord record_of(const lanes::FilterResult& result, const CampaignPlan& plan)
   const Eigen::VectorXd error = result.error.head(size);
   const Eigen::MatrixXd covariance = result.covariance.topLeftCorner(size, size);
   RunRecord record;
-  record.outcome = result.reopened == 0 ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
-  if (result.reopened > 0) {
-    record.findings.emplace_back(name_of(FindingCode::kReopened));
-  }
+  const Verdict verdict = ground::judge_use_of_fixes(statistics_of(result));
+  const bool is_trustworthy = verdict.trustworthy && result.reopened == 0;
+  record.outcome = is_trustworthy ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
+  put_into(record.findings, verdict);
   record.drift_model = name_of(result.drift_model);
   for (const RunQuantityRow& row : kRunQuantityRows) {
     if (plan.has(row.quantity)) {

@@ -116,7 +116,7 @@ std::optional<RankCorrelation> rank_correlation(std::span<const double> x, std::
       second.push_back(y[i]);
     }
   }
-  constexpr std::size_t kFewest = 4;
+  constexpr std::size_t kFewest = 10;
   if (first.size() < kFewest) {
     return std::nullopt;
   }

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <regex>
 #include <set>
 #include <utility>
 
@@ -370,6 +371,11 @@ void judge_failures(std::span<const RunRecord> records, CampaignSummary& summary
        FindingSeverity::kDoNotUse});
 }
 
+std::string without_numbers(const std::string& reason) {
+  static const std::regex kNumber("[0-9][0-9.]*(e[-+]?[0-9]+)?");
+  return std::regex_replace(reason, kNumber, "0");
+}
+
 std::map<std::string, std::size_t> runs_by_finding(const Records& records) {
   std::map<std::string, std::size_t> runs;
   for (const RunRecord* record : records) {
@@ -406,11 +412,13 @@ void judge_verdicts(CampaignWork work, const Records& trustworthy, const Records
   summary.campaign_findings.push_back(
       {"runs-not-trustworthy",
        fmt::format("{} of {} {}.", refused.size(), finished.size(),
-                   are_filters ? "filters began anew on the way" : "calibrations say of themselves: do not use"),
+                   are_filters ? "filters began anew on the way, or used too few of the fixes"
+                               : "calibrations say of themselves: do not use"),
        fmt::format("{:.1f} % of the runs{}",
                    100.0 * static_cast<double>(refused.size()) / static_cast<double>(finished.size()), why),
-       are_filters ? "Look at one with --only: the fixes contradicted what the filter had found."
-                   : "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
+       are_filters
+           ? "Look at one with --only: there were hardly any fixes, or they contradicted what the filter had found."
+           : "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
        trustworthy.empty() ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
 }
 
@@ -544,10 +552,11 @@ CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> r
   CampaignSummary summary;
   Records finished;
   Records trustworthy;
+  std::map<std::string, std::string> first_of_its_kind;  // reasons, by what they have beside numbers
   for (const RunRecord& record : records) {
     ++summary.outcomes[static_cast<std::size_t>(record.outcome)];
     if (record.outcome == RunOutcome::kFailed) {
-      ++summary.reasons[record.reason];
+      ++summary.reasons[first_of_its_kind.try_emplace(without_numbers(record.reason), record.reason).first->second];
       continue;
     }
     finished.push_back(&record);

@@ -190,6 +190,24 @@ TEST(CampaignOfFilters, AFailureOfTheFilterAloneIsThatOfTheCampaign) {
   EXPECT_TRUE(was_flown);
 }
 
+TEST(CampaignOfFilters, AreNotTrustworthyWhereHardlyAFixIsUsed) {
+  const auto few = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = flight_of_eq1(seed, draws);
+    setup.scenario.star_tracker.dropout_probability = 0.95;
+    return setup;
+  };
+  const auto rejected = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = flight_of_eq1(seed, draws);
+    setup.scenario.star_tracker.outlier_probability = 0.3;
+    setup.scenario.star_tracker.outlier_rad = 0.02;
+    return setup;
+  };
+  EXPECT_THAT(perform(runs_of_filters(8), 3, few).findings, testing::ElementsAre("too-few-fixes"));
+  EXPECT_EQ(perform(runs_of_filters(8), 3, few).outcome, RunOutcome::kDoNotUse);
+  EXPECT_THAT(perform(runs_of_filters(8), 3, rejected).findings, testing::Contains("many-rejected"));
+  EXPECT_EQ(perform(runs_of_filters(8), 3, rejected).outcome, RunOutcome::kDoNotUse);
+}
+
 TEST(CampaignOfFilters, RunsThatFailAreRowsAmongTheOthers) {
   const auto some_fail = [](std::uint64_t seed, std::span<const double> draws) {
     RunSetup setup = flight_of_eq1(seed, draws);

@@ -53,32 +53,35 @@ TEST(OrderStatistics, OfASingleValueBoundNothing) {
 }
 
 TEST(RankCorrelation, IsOneForWhatGrowsTogetherWhateverItsScale) {
-  const std::vector<double> x = {1, 2, 3, 4, 5};
-  const std::vector<double> y = {1, 10, 100, 1000, std::numeric_limits<double>::infinity()};
+  const std::vector<double> x = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+  const std::vector<double> y = {-5, -4, -3, -2, -1, 1, 10, 100, 1000, std::numeric_limits<double>::infinity()};
   ASSERT_TRUE(rank_correlation(x, y).has_value());
   EXPECT_EQ(rank_correlation(x, y)->rho, 1);
   EXPECT_EQ(rank_correlation(x, y)->p_value, 0);
 }
 
 TEST(RankCorrelation, HasTheValueOfTheTextbookAndMeanRanksForTies) {
-  // Ranks of y: 1, 3, 2, 5, 4: rho = 1 − 6·(0 + 1 + 1 + 1 + 1)/(5·24) = 0.8; t = 0.8 √(3/0.36) = 2.3094, two-sided p
-  // 0.1041.
-  const std::vector<double> x = {10, 20, 30, 40, 50};
-  const std::vector<double> y = {1, 6, 2, 9, 8};
+  // Ranks of y: 4, 1, 2, 3, 5, 9, 6, 10, 7, 8: rho = 1 − 6·34/(10·99) = 0.793939; t = 3.69344 of 8 degrees of freedom,
+  // two-sided p 0.0061.
+  const std::vector<double> x = {10, 20, 30, 40, 50, 60, 70, 80, 90, 100};
+  const std::vector<double> y = {0.4, 0.1, 0.2, 0.3, 0.5, 9, 6, 10, 7, 8};
   const auto correlation = rank_correlation(x, y);
   ASSERT_TRUE(correlation.has_value());
-  EXPECT_NEAR(correlation->rho, 0.8, 1e-12);
-  EXPECT_NEAR(correlation->p_value, 0.10409, 1e-5);
-  // Ranks 1.5, 1.5, 3, 4 against 1, 2, 3, 4: 4.5/√(4.5·5).
-  EXPECT_NEAR(rank_correlation(std::vector<double>{7, 7, 8, 9}, std::vector<double>{1, 2, 3, 4})->rho,
-              4.5 / std::sqrt(4.5 * 5), 1e-12);
+  EXPECT_NEAR(correlation->rho, 0.793939, 1e-6);
+  EXPECT_NEAR(correlation->p_value, 0.0061, 1e-6);
+  // Ranks 1.5, 1.5, 3, …, 10 against 1, 2, 3, …, 10: 82/√(82·82.5).
+  EXPECT_NEAR(rank_correlation(std::vector<double>{7, 7, 8, 9, 10, 11, 12, 13, 14, 15}, x)->rho,
+              82 / std::sqrt(82 * 82.5), 1e-12);
 }
 
 TEST(RankCorrelation, IsNoneForFewPairsOrWhatDoesNotChange) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3}, std::vector<double>{1, 2, 3}).has_value());
-  EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3, nan}, std::vector<double>{1, 2, 3, 4}).has_value());
-  EXPECT_FALSE(rank_correlation(std::vector<double>{5, 5, 5, 5}, std::vector<double>{1, 2, 3, 4}).has_value());
+  std::vector<double> x = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+  const std::vector<double> y = x;
+  EXPECT_FALSE(rank_correlation(std::span(x).first(9), std::span(y).first(9)).has_value());
+  EXPECT_FALSE(rank_correlation(std::vector<double>(10, 5), y).has_value());
+  x.back() = nan;
+  EXPECT_FALSE(rank_correlation(x, y).has_value());
 }
 
 TEST(OrderScores, AreTheOrderOfTheRanksWhereAllIsKnown) {
@@ -205,6 +208,21 @@ TEST(CampaignSummary, OfRunsThatFailedIsNotToBeUsed) {
   EXPECT_EQ(summary.reasons.at("no fix"), 1U);
   EXPECT_EQ(summary.nees->runs, 799U);
   EXPECT_EQ(summary.worst.front().run, 3U);
+}
+
+TEST(CampaignSummary, CountsReasonsTogetherThatDifferInNumbersAlone) {
+  std::vector<RunRecord> records = runs_of(800);
+  for (const std::size_t run : {3U, 5U, 9U, 10U}) {
+    records[run].outcome = RunOutcome::kFailed;
+    records[run].reason = "perigee 428.795km above apogee 1e+03km";
+  }
+  records[5].reason = "perigee 500km above apogee 4.5e-05km";
+  records[9].reason = "no fix";
+  const CampaignSummary summary = summarise(plan_of(800), records);
+  EXPECT_EQ(summary.reasons.size(), 2U);
+  EXPECT_EQ(summary.reasons.at("perigee 428.795km above apogee 1e+03km"), 3U);
+  EXPECT_THAT(summary.campaign_findings.front().evidence,
+              testing::EndsWith("most often: perigee 428.795km above apogee 1e+03km"));
 }
 
 TEST(CampaignSummary, WithoutATrustworthyRunIsNotToBeUsed) {

@@ -23,6 +23,7 @@
 #include "steps.hpp"
 #include "terminal.hpp"
 #include "transport.hpp"
+#include "trihedron/campaign/distribute.hpp"
 #include "trihedron/campaign/perform.hpp"
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/campaign/summary.hpp"
@@ -78,7 +79,8 @@ campaign::SetupOf setups_of(const io::CampaignFile& file) {
 
 /// Without --only and the number.
 std::string command_of(const CampaignArguments& arguments) {
-  return fmt::format("trihedron campaign {} -o {}", arguments.file, arguments.out.empty() ? "OUT" : arguments.out);
+  return fmt::format("trihedron campaign {} -o {}", shell_word(arguments.file),
+                     arguments.out.empty() ? "OUT" : shell_word(arguments.out));
 }
 
 bool is_there(const fs::path& path) {
@@ -89,9 +91,7 @@ bool is_there(const fs::path& path) {
 /// The runs that OUT has of this campaign; nothing where there is no journal. Refuses that of another campaign.
 std::optional<io::Journal> journal_in(const fs::path& out, const CampaignIdentity& identity) {
   const fs::path file = out / kJournalFile;
-  std::error_code ignored;
-  // It is empty where the campaign was killed before it had written its first line.
-  if (!is_there(file) || fs::is_empty(file, ignored)) {
+  if (!is_there(file) || io::is_barely_begun(file, identity)) {
     return std::nullopt;
   }
   io::Journal journal = io::read_journal(file);
@@ -127,6 +127,11 @@ class Campaign {
       if (journal->damaged > 0) {
         say(fmt::format("trihedron: {}: {} damaged, performed again\n", printable(journal_file.string()),
                         journal->damaged == 1 ? "1 run is" : fmt::format("{} runs are", journal->damaged)));
+      }
+      if (const std::size_t lost = std::erase_if(journal->records, campaign::was_lost); lost > 0) {
+        say(fmt::format("trihedron: {}: {} with {} process, performed again\n", printable(journal_file.string()),
+                        lost == 1 ? "1 run was lost" : fmt::format("{} runs were lost", lost),
+                        lost == 1 ? "its" : "their"));
       }
       writer_.emplace(journal_file, *journal);
       records_ = std::move(journal->records);

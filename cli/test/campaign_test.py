@@ -4,6 +4,7 @@ import json
 import os
 import pty
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -162,6 +163,18 @@ def test_a_record_that_is_damaged_is_performed_again_and_the_others_stay(finishe
     assert table(out) == table(finished / "out")
 
 
+def test_a_journal_that_is_cut_short_in_its_first_line_holds_no_run(finished):
+    out = finished / "begun"
+    out.mkdir()
+    head = (finished / "out" / "runs.journal").read_bytes().split(b"\n")[0]
+    for size in (0, 1, 300, len(head)):
+        (out / "runs.journal").write_bytes(head[:size])
+        assert run("--quiet", "campaign", finished / "c.toml", "-o", out, "--resume").returncode in (TRUSTWORTHY, DO_NOT_USE)
+        assert table(out) == table(finished / "out")
+    (out / "runs.journal").write_bytes(head[:300] + b"?")
+    refused(run("campaign", finished / "c.toml", "-o", out, "--resume"), INPUT_REFUSED, "no journal")
+
+
 @pytest.mark.parametrize("with_signal", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_stop_keeps_what_is_finished_and_says_how_to_go_on(long_one, tmp_path, with_signal):
     directory, _ = long_one
@@ -314,6 +327,36 @@ def test_a_run_that_was_lost_with_its_process_is_performed_alone(finished, tmp_p
     assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
     assert "failed there: ended its process 2 times" in result.stdout
     assert (tmp_path / "out" / "run-7" / "report.html").exists()
+    result = run("--quiet", "campaign", finished / "c.toml", "-o", tmp_path / "out", "--resume")
+    assert "1 run was lost with its process, performed again" in result.stderr
+    assert table(tmp_path / "out") == table(finished / "out")
+
+
+def test_commands_are_shown_as_a_shell_takes_them(finished, tmp_path):
+    directory = tmp_path / "it's here"
+    directory.mkdir()
+    shutil.copy(finished / "c.toml", directory / "c d.toml")
+    result = run("campaign", directory / "c d.toml", "-o", directory / "out")
+    command = result.stdout.split("each again by: trihedron ")[1].split("\n")[0]
+    assert shlex.split(command)[:4] == ["campaign", str(directory / "c d.toml"), "-o", str(directory / "out")]
+
+
+def test_dates_and_words_that_begin_with_a_digit_are_words(tmp_path):
+    epochs = ["2009-05-20T00:00:00", "2010-05-20T00:00:00"]
+    (tmp_path / "c.toml").write_text(FILTERS.replace("repeats = 10", "repeats = 1") + f"scenario.epoch_tai = {{grid = {epochs}}}\n"
+                                     'scenario.spacecraft = {choice = ["1st", "2nd"]}\n')
+    assert run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "out").returncode == TRUSTWORTHY
+    with xarray.open_dataset(tmp_path / "out" / "runs.nc") as runs:
+        assert sorted({str(word) for word in runs.input_scenario_epoch_tai.values}) == epochs
+
+
+def test_draws_that_are_possible_together_alone_are_taken(tmp_path):
+    together = 'orbit.perigee_altitude = {uniform = ["700km", "800km"]}\norbit.apogee_altitude = '
+    for apogee in ('{uniform = ["800km", "900km"]}', '{of = "orbit.perigee_altitude"}'):
+        (tmp_path / "c.toml").write_text(FILTERS + together + apogee + "\n")
+        assert run("--quiet", "campaign", tmp_path / "c.toml", "--only", "3").returncode == TRUSTWORTHY
+    (tmp_path / "c.toml").write_text(FILTERS + together + '{uniform = ["600km", "900km"]}\n')
+    refused(run("campaign", tmp_path / "c.toml", "--only", "3"), INPUT_REFUSED, "apogee_altitude", "can be drawn")
 
 
 def test_covariances_are_kept_where_they_are_asked_for(finished, tmp_path):
@@ -404,6 +447,10 @@ def with_key(line):
      ["c.toml:23:", "follows a setting"]),
     (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], times = 2}'), ["c.toml:23:", "no meaning"]),
     (with_key('gyro.readout.spike = {choice = ["1arcsec", "2arcsec"], names = ["small"]}'), ["c.toml:23:", "names"]),
+    (with_key('gyro.readout.spike = {choice = ["1arcsec", "2arcsec"], names = ["small", "small"]}'), ["c.toml:23:", "small", "of two values"]),
+    (with_key("gyro.readout.spike_probability = {uniform = [0, inf]}"), ["c.toml:23:", "no finite number"]),
+    (FILTERS.replace("[base.gyro.drift]", '[base.gyro]\nmisalignment = ["1arcmin", "2arcmin", "3arcmin"]\n[base.gyro.drift]') +
+     'gyro.misalignment_magnitude = {uniform = ["1arcmin", "2arcmin"]}\n', ["c.toml:16:", "misalignment_magnitude", "keep one of them"]),
     (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
     (CAMPAIGN.replace("seed = 5", 'covariance = "yes"'), ["c.toml:5:", "kept"]),

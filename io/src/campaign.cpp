@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "quantity_kind.hpp"
 #include "schemas.hpp"
 #include "settings_tables.hpp"
 #include "text_file.hpp"
@@ -229,8 +230,8 @@ class DistributionReader {
 
   [[nodiscard]] Amount amount(const toml::node& node) const {
     const std::optional<Amount> found = amount_of(node);
-    if (!found) {
-      refuse(node, fmt::format("{} is no number", in_quotes(text_of(node))),
+    if (!found || !std::isfinite(found->value)) {
+      refuse(node, fmt::format("{} is no {}number", in_quotes(text_of(node)), found ? "finite " : ""),
              "give a number, with its unit where the key has one, like \"2arcsec\"; words go into {choice = [a, b]}");
     }
     return *found;
@@ -310,7 +311,10 @@ class DistributionReader {
     bool all_numbers = true;
     const toml::node* of_another_unit = nullptr;
     for (const toml::node& node : list) {
-      const std::optional<Amount> found = amount_of(node);
+      std::optional<Amount> found = amount_of(node);
+      if (found && !found->unit.empty() && !is_unit(found->unit)) {
+        found.reset();  // a date, or a word that begins with a digit
+      }
       if (input.options.empty() && found) {
         input.unit = found->unit;
       }
@@ -349,7 +353,13 @@ class DistributionReader {
     input.numbers.clear();
     input.unit.clear();
     for (std::size_t i = 0; i < names->size(); ++i) {
-      input.options[i] = reader_.text((*names)[i], "names");
+      std::string name = reader_.text((*names)[i], "names");
+      if (std::find(input.options.begin(), input.options.begin() + static_cast<std::ptrdiff_t>(i), name) !=
+          input.options.begin() + static_cast<std::ptrdiff_t>(i)) {
+        refuse((*names)[i], fmt::format("{} is the name of two values", in_quotes(name)),
+               "give each a name of its own");
+      }
+      input.options[i] = std::move(name);
     }
   }
 
@@ -551,20 +561,57 @@ struct CampaignFile::Content {
     return plan.work != CampaignWork::kFilter || of.estimator != Estimator::kBatch;
   }
 
+  /// Scenario or settings with one input drawn.
+  [[nodiscard]] toml::table drawn_alone(const Varied& one, double draw) const {
+    toml::table drawn_into = one.input.is_setting() ? settings : base;
+    put_draw(drawn_into, one, draw);
+    return drawn_into;
+  }
+
+  /// The same with all inputs of its kind, the others in the middle of what can be drawn for them.
+  [[nodiscard]] toml::table drawn_among_others(std::size_t one, double draw) const {
+    std::vector<double> draws;
+    for (std::size_t i = 0; i < varied.size(); ++i) {
+      const Distribution& its = varied[i].input.distribution;
+      draws.push_back(i == one ? draw : its.has_options() ? 0 : (its.least + its.most) / 2);
+    }
+    for (std::size_t i = 0; i < varied.size(); ++i) {
+      if (const CampaignInput& input = varied[i].input; input.distribution.kind == Kind::kFollows) {
+        draws[i] = following(input, draws[input.followed]);
+      }
+    }
+    toml::table drawn_into = varied[one].input.is_setting() ? settings : base;
+    put_draws(drawn_into, draws, varied[one].input.is_setting());
+    return drawn_into;
+  }
+
+  /// Throws what says why these cannot be flown.
+  void expect_possible(const Varied& one, const toml::table& drawn_into, const ScenarioCheck& check) const {
+    if (!one.input.is_setting()) {
+      check(scenario_of_table(drawn_into, scenario_file, "the scenario"));
+    } else if (!has_filter(config_of_table(drawn_into, settings_file, settings_name))) {
+      throw InputRefused(file, {}, std::string(kNoFilter), std::string(kTakeAFilter));
+    }
+  }
+
+  /// Whether a draw that is impossible in the base scenario is possible among others; `root`: the input itself, or the
+  /// one that it follows.
+  [[nodiscard]] bool is_possible_among_others(const Varied& one, std::size_t root, double draw_of_root,
+                                              const ScenarioCheck& check) const {
+    try {
+      expect_possible(one, drawn_among_others(root, draw_of_root), check);
+      return true;
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+
   void try_draw(const Varied& one, double draw, const ScenarioCheck& check) const {
     const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
                                                                   : fmt::format("{}{}", draw, one.input.unit);
     const std::string drawn = fmt::format("{} = {}", one.input.key, in_quotes(what));
-    toml::table drawn_into = one.input.is_setting() ? settings : base;
     try {
-      put_draw(drawn_into, one, draw);
-      if (one.input.is_setting()) {
-        if (!has_filter(config_of_table(drawn_into, settings_file, settings_name))) {
-          refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, kNoFilter), std::string(kTakeAFilter));
-        }
-      } else {
-        check(scenario_of_table(drawn_into, scenario_file, "the scenario"));
-      }
+      expect_possible(one, drawn_alone(one, draw), check);
     } catch (const NoPlace& none) {
       refuse(*one.place, fmt::format("{}: {}", drawn, none.reason), none.cure);
     } catch (const InputOutsideRange& refused) {
@@ -639,23 +686,39 @@ struct CampaignFile::Content {
     input.unit = its->input.unit;
   }
 
-  /// Least and most that can be drawn, or each option.
-  [[nodiscard]] std::vector<double> ends_of(const Varied& one) const {
+  /// Least and most that can be drawn, or each option, of an input that follows no other.
+  [[nodiscard]] static std::vector<double> ends_of(const Varied& one) {
     const Distribution& its = one.input.distribution;
     std::vector<double> ends;
     if (its.has_options()) {
       for (std::size_t option = 0; option < its.options; ++option) {
         ends.push_back(static_cast<double>(option));
       }
-    } else if (its.kind == Kind::kFollows) {
-      const Varied& followed = varied[one.input.followed];
-      for (const double end : ends_of(followed)) {
-        ends.push_back(its.a * followed.input.shown(end));
-      }
     } else {
       ends = {its.least, its.most};
     }
     return ends;
+  }
+
+  /// The draw of an input that follows another, by that of the other.
+  [[nodiscard]] double following(const CampaignInput& input, double draw) const {
+    return input.distribution.a * varied[input.followed].input.shown(draw);
+  }
+
+  /// Refuses an input that can draw what nothing can be flown with.
+  void try_ends(std::size_t one, const ScenarioCheck& check) const {
+    const CampaignInput& input = varied[one].input;
+    const bool follows = input.distribution.kind == Kind::kFollows;
+    const std::size_t root = follows ? input.followed : one;
+    for (const double end : ends_of(varied[root])) {
+      try {
+        try_draw(varied[one], follows ? following(input, end) : end, check);
+      } catch (const InputRefused&) {
+        if (!is_possible_among_others(varied[one], root, end, check)) {
+          throw;
+        }
+      }
+    }
   }
 
   void expect_different_keys() const {
@@ -749,11 +812,9 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
       content->follow(one);
     }
   }
-  for (const Varied& one : content->varied) {
-    for (const double end : content->ends_of(one)) {
-      content->try_draw(one, end, check);
-    }
-    content->plan.inputs.push_back(one.input);
+  for (std::size_t i = 0; i < content->varied.size(); ++i) {
+    content->try_ends(i, check);
+    content->plan.inputs.push_back(content->varied[i].input);
   }
   content_ = std::move(content);
 }

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <set>
 #include <span>
 #include <utility>
 
@@ -70,6 +69,9 @@ Json json_of(const CampaignIdentity& identity) {
   }
   return {{"format", kJournalFormat}, {"version", 1}, {"digest", digest_of(identity)}, {"campaign", lines}};
 }
+
+/// Of a journal, without the line end.
+std::string first_line(const CampaignIdentity& identity) { return sealed(json_of(identity)); }
 
 [[noreturn]] void refuse_journal(const fs::path& file) {
   throw InputRefused(file, {1, 1}, "is no journal of a campaign that this program knows",
@@ -169,11 +171,15 @@ std::optional<RunRecord> parse_record(std::string_view line) {
   }
 }
 
+bool is_barely_begun(const fs::path& file, const CampaignIdentity& identity) {
+  return first_line(identity).starts_with(TextFile(file).text());
+}
+
 Journal read_journal(const fs::path& file) {
   const TextFile content(file);
   const std::string_view text = content.text();
   Journal journal;
-  std::set<std::uint64_t> seen;
+  std::map<std::uint64_t, RunRecord> records;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = text.find('\n', begin);
     if (end == std::string_view::npos) {
@@ -183,9 +189,8 @@ Journal read_journal(const fs::path& file) {
     if (begin == 0) {
       journal.identity = identity_of(opened(line), file);
     } else if (std::optional<RunRecord> record = parse_record(line)) {
-      if (seen.insert(record->run).second) {
-        journal.records.push_back(std::move(*record));
-      }
+      const std::uint64_t run = record->run;
+      records.insert_or_assign(run, std::move(*record));
     } else {
       ++journal.damaged;
     }
@@ -196,12 +201,14 @@ Journal read_journal(const fs::path& file) {
     static_cast<void>(identity_of(Json(), file));
   }
   journal.crc = crc_of(text.substr(0, journal.size));
-  std::ranges::sort(journal.records, {}, &RunRecord::run);
+  for (auto& [run, record] : records) {
+    journal.records.push_back(std::move(record));
+  }
   return journal;
 }
 
 JournalWriter::JournalWriter(const fs::path& file, const CampaignIdentity& identity) : file_(GrowingFile::begin(file)) {
-  file_.append(sealed(json_of(identity)) + "\n");
+  file_.append(first_line(identity) + "\n");
   file_.synchronise();
 }
 

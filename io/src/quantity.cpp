@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -108,6 +109,12 @@ Range in_unit(const Range& range, double factor, std::string_view unit) {
 }
 
 }  // namespace
+
+bool is_unit(std::string_view name) {
+  return std::ranges::any_of(kQuantityKinds, [name](const QuantityKind* kind) {
+    return std::ranges::find(kind->units, name, &UnitOfMeasure::name) != kind->units.end();
+  });
+}
 
 double parse_quantity(std::string_view text, const QuantityKind& kind) { return measured(text, kind).value; }
 

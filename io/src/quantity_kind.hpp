@@ -64,6 +64,12 @@ inline constexpr QuantityKind kAcceleration{"an angular acceleration", units::kA
 inline constexpr QuantityKind kRateWalk{"a random walk of a rate", units::kRateWalks, "1e-9rad/s/s^0.5",
                                         limits::kRateWalk_rad_s_sqrt_s};  ///< rad/s/√s
 
+inline constexpr std::array kQuantityKinds = {&kDuration, &kAngle,     &kRate,         &kRandomWalk,
+                                              &kLength,   &kFrequency, &kAcceleration, &kRateWalk};
+
+/// Of some kind.
+[[nodiscard]] bool is_unit(std::string_view name);
+
 /// The value of a text, in the unit of the kind. Throws UsageError that names what is accepted.
 [[nodiscard]] double parse_quantity(std::string_view text, const QuantityKind& kind);
 /// Same, within a range, which the UsageError tells in the unit of the text.

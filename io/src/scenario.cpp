@@ -322,6 +322,17 @@ Fields gyro_fields(Scenario& scenario, GyroScenario& gyro, const fs::path& file)
          unit_fields(gyro, file);
 }
 
+/// What a table says of a gyro. A misalignment that is told has the size that it has.
+void read_gyro(const toml::table& table, const fs::path& file, const std::string& name, const Fields& fields,
+               const GyroScenario& gyro) {
+  read_fields(table, file, name, fields);
+  if (const toml::node* size = table.get("misalignment_magnitude"); size != nullptr && gyro.misalignment_rad) {
+    TomlTable(table, file, name)
+        .refuse(*size, "\"misalignment\" and \"misalignment_magnitude\" are both there",
+                "keep one of them: the magnitude is that of a misalignment that is drawn");
+  }
+}
+
 /// What [gyro] says of all gyros, and [[gyro.unit]] of each. Without units there are the two of the default.
 void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenario) {
   const toml::node* units = table.get("unit");
@@ -340,9 +351,9 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
   }
   for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {
     GyroScenario& gyro = scenario.gyros[i];
-    read_fields(table, file, "[gyro]", gyro_fields(scenario, gyro, file));
+    read_gyro(table, file, "[gyro]", gyro_fields(scenario, gyro, file), gyro);
     if (units != nullptr) {
-      read_fields(*tables[i], file, fmt::format("[[gyro.unit]] {}", i + 1), unit_fields(gyro, file));
+      read_gyro(*tables[i], file, fmt::format("[[gyro.unit]] {}", i + 1), unit_fields(gyro, file), gyro);
     }
   }
 }

@@ -63,10 +63,11 @@ void select(UnscreenedPass& raw, const fs::path& path, std::vector<Defect>& defe
   const Time begin = std::max(epoch, selection.from.value_or(epoch));
   const Time end = std::min(end_of_pass, selection.to.value_or(end_of_pass));
   if (selection.from && selection.to && *selection.to < *selection.from) {
-    throw InputRefused(path, {},
-                       fmt::format("the time range asked for ends, at {} TAI, before it begins, at {} TAI",
-                                   format_epoch(*selection.to), format_epoch(*selection.from)),
-                       "exchange its ends");
+    throw InputRefused(
+        path, {},
+        fmt::format("the time range asked for ends, at {} TAI, before it begins, at {} TAI",
+                    format_epoch(*selection.to), format_epoch(*selection.from)),
+        "exchange its ends; one that the command does not give is that of the description of the telemetry");
   }
   if (end - begin < kShortestPass) {
     throw InputRefused(

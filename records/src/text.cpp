@@ -100,6 +100,18 @@ std::string printable(std::string_view text) { return shown(text, false); }
 
 std::string printable_lines(std::string_view text) { return shown(text, true); }
 
+std::string shell_word(std::string_view text) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./,:=+@%-";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string_view::npos) {
+    return std::string(text);
+  }
+  std::string word = "'";
+  for (const char c : text) {
+    word += c == '\'' ? R"('\'')" : std::string(1, c);
+  }
+  return word + "'";
+}
+
 std::string_view nearest(std::string_view unknown, std::span<const std::string_view> known) {
   // A longer name is not read as a mistake for any: the distance takes their product in time.
   constexpr std::size_t kLongest = 100;

@@ -31,6 +31,14 @@ TEST(Text, WhatATerminalObeysIsShownInstead) {
   EXPECT_EQ(printable(std::string("a\0b", 3)), "a\\x00b");
 }
 
+TEST(ShellWord, IsQuotedWhereAShellWouldReadAnythingElse) {
+  EXPECT_EQ(shell_word("../out/run-1.nc"), "../out/run-1.nc");
+  EXPECT_EQ(shell_word("a b"), "'a b'");
+  EXPECT_EQ(shell_word("it's $HOME"), R"('it'\''s $HOME')");
+  EXPECT_EQ(shell_word("~"), "'~'");
+  EXPECT_EQ(shell_word(""), "''");
+}
+
 TEST(Text, BytesThatAreNoUtf8AreShownAsNumbers) {
   EXPECT_EQ(printable("p\xFFss"), "p\\xffss");
   EXPECT_EQ(printable("\xC3"), "\\xc3") << "cut short";

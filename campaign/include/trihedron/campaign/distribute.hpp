@@ -43,6 +43,9 @@ class Workers {
 /// Processes that one run may end before it counts as failed.
 inline constexpr int kProcessesForARun = 2;
 
+/// Whether a run has failed in that its process ended so often. Performed again it may succeed.
+[[nodiscard]] bool was_lost(const RunRecord& record);
+
 /// Gives runs to workers as they have nothing to do, as many as are best performed together, and hands over what has
 /// come, in no order. Runs whose worker ends are given to others, each by itself; a run whose worker ends a second time
 /// has failed. Throws what `workers` and `collect` throw, and std::logic_error where a worker gives a record of another

@@ -128,15 +128,16 @@ inline constexpr double kCellQuantile = 0.95;
 struct CampaignSummary {
   std::array<std::size_t, 3> outcomes{};        ///< by RunOutcome
   std::map<std::string, std::size_t> findings;  ///< runs by the codes of their findings
-  std::map<std::string, std::size_t> reasons;   ///< runs that failed, by the reason
-  std::optional<Consistency> nees;              ///< of trustworthy runs
-  std::optional<Consistency> nees_of_all;       ///< of all that did not fail
-  std::optional<Consistency> nis;               ///< of trustworthy runs
-  std::vector<MeasureStatistics> trustworthy;   ///< by measures(): of trustworthy runs
-  std::vector<MeasureStatistics> all;           ///< of all that did not fail
-  std::vector<ParameterErrors> parameters;      ///< of trustworthy runs
-  std::vector<Influence> influences;            ///< strongest first; of all that did not fail
-  std::size_t pairs = 0;                        ///< that were looked at for an influence
+  std::map<std::string, std::size_t>
+      reasons;  ///< runs that failed, by the reason; the first of those that differ in numbers alone
+  std::optional<Consistency> nees;             ///< of trustworthy runs
+  std::optional<Consistency> nees_of_all;      ///< of all that did not fail
+  std::optional<Consistency> nis;              ///< of trustworthy runs
+  std::vector<MeasureStatistics> trustworthy;  ///< by measures(): of trustworthy runs
+  std::vector<MeasureStatistics> all;          ///< of all that did not fail
+  std::vector<ParameterErrors> parameters;     ///< of trustworthy runs
+  std::vector<Influence> influences;           ///< strongest first; of all that did not fail
+  std::size_t pairs = 0;                       ///< that were looked at for an influence
   std::vector<WorstRun> worst;
   std::vector<std::size_t> grid;  ///< of CampaignPlan::inputs the grids of several values
   std::vector<GridCell> cells;    ///< in the order of the runs; empty without a grid, or with one run at each point

@@ -75,7 +75,11 @@ struct Journal {
   std::uint32_t crc = 0;           ///< crc32() of them
 };
 
-/// Throws InputRefused for a file that is no journal.
+/// Whether the file ends within the line that a journal of this campaign begins with: it was killed, or the disk was
+/// full, before a run could be kept.
+[[nodiscard]] bool is_barely_begun(const std::filesystem::path& file, const CampaignIdentity& identity);
+
+/// Of a run that is there twice the later record. Throws InputRefused for a file that is no journal.
 [[nodiscard]] Journal read_journal(const std::filesystem::path& file);
 
 /// The finished runs of a campaign, one line each, that outlive whatever ends the program. One writer at a time.

@@ -18,6 +18,9 @@ namespace trihedron {
 /// The same of several lines: '\n' stays.
 [[nodiscard]] std::string printable_lines(std::string_view text);
 
+/// As a word of a command, which a POSIX shell gives to a program as it is here.
+[[nodiscard]] std::string shell_word(std::string_view text);
+
 /// The name that was probably meant, or nothing when none is near. A name that the unknown one begins (its unit suffix
 /// is missing) is nearest.
 [[nodiscard]] std::string_view nearest(std::string_view unknown, std::span<const std::string_view> known);
