@@ -1,5 +1,6 @@
 #include "batch/batch.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +14,18 @@ double step_of_constants(const Layout& layout, const SmootherResult& found) {
   const Eigen::VectorXd sigma = found.last_root.bottomRows(layout.constants()).rowwise().norm();
   const Eigen::VectorXd step = found.x.back().tail(layout.constants()).cwiseQuotient(sigma);
   return step.norm() / std::sqrt(static_cast<double>(layout.constants()));
+}
+
+/// What the linear model leaves out of the alignments, rad: of their step, and of what is not known of them where they
+/// then stand. It may be much where a step is little of its sigma: about an axis that the pass does not show.
+double second_order_rad(const Layout& layout, const SmootherResult& found) {
+  double largest_rad = 0;
+  for (int k = 0; k < layout.gyros; ++k) {
+    const double step_rad = found.x.back().segment<3>(layout.alignment(k)).norm();
+    const double sigma_rad = found.last_root.middleRows<3>(layout.alignment(k)).norm();
+    largest_rad = std::max(largest_rad, step_rad * (step_rad + sigma_rad));
+  }
+  return largest_rad;
 }
 
 }  // namespace
@@ -30,9 +43,11 @@ BatchResult step_from(const PassProblem& problem, PassSolution before, PassProbl
 }
 
 BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged) {
+  constexpr double kSmall_rad = 2e-7;  // 0.04″: less than the mean of many fixes tells
   BatchResult result;
   result.solution = std::move(first);
-  while (result.iterations < kMostIterations && !result.converged) {
+  bool is_straight = false;
+  while (result.iterations < kMostIterations && !(result.converged && is_straight)) {
     const int before = result.iterations;
     PassSolution from = std::move(result.solution);
     result = {};  // long: one at a time
@@ -40,6 +55,7 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
     result = step_from(problem, std::move(from), std::move(linear));
     result.iterations += before;
     result.converged = result.step < converged;
+    is_straight = second_order_rad(problem.layout(), result.errors) < kSmall_rad;
   }
   return result;
 }

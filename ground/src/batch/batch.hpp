@@ -17,7 +17,8 @@ struct BatchResult {
 
 /// Iterates to the most likely solution from `first`: Gauss–Newton over parameters and momenta together, which with
 /// process noise is the iterated fixed-interval smoother. Converged is when the constants step by less than `converged`
-/// of their sigmas. Throws SetupError where they are not determined.
+/// of their sigmas; the steps go on where alignments that the pass does not determine still move by more than the
+/// linear model holds. Throws SetupError where they are not determined.
 [[nodiscard]] BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged = 0.02);
 
 /// One step of it from `before`, by the problem linearised there. Throws as most_likely().

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <future>
 #include <limits>
-#include <numbers>
+#include <span>
 #include <utility>
 
 #include "choose/noise_search.hpp"
@@ -22,42 +22,71 @@ constexpr std::size_t kLeastFixPairs = 100;
 /// So many tell the noise of a stretch of the pass to some percent.
 constexpr std::size_t kFixPairsOfStretch = 1000;
 
-/// 1-sigma of the star tracker by the changes of a trial, in the order of their times. Needs changes. Noise may be more
-/// for a part of the pass: the root mean square over stretches, without outliers, of which no stretch counts as more
-/// than three times the median of all.
-Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
-  constexpr double kMost = 3;
-  const std::size_t stretches = std::max<std::size_t>(changes_rad.size() / kFixPairsOfStretch, 1);
-  Eigen::Vector3d noise_rad;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> sigmas;
-    for (std::size_t n = 0; n < stretches; ++n) {
-      std::vector<double> sizes;
-      for (std::size_t i = n * changes_rad.size() / stretches; i < (n + 1) * changes_rad.size() / stretches; ++i) {
-        sizes.push_back(std::abs(changes_rad[i](axis)) / std::numbers::sqrt2);
-      }
-      sigmas.push_back(sigma_without_outliers(sizes));
-    }
-    std::ranges::sort(sigmas);
-    const double most = kMost * sigmas[sigmas.size() / 2];
-    double square = 0;
-    for (const double sigma : sigmas) {
-      square += std::pow(std::min(sigma, most), 2) / static_cast<double>(stretches);
-    }
-    noise_rad(axis) = std::sqrt(square);
+/// Noise of the readings over that of a fix, as they say, about c x, y, z: ratio of the variances, in the mean.
+Eigen::Array3d readout_by_fix(std::span<const ChangeBetweenFixes> changes) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  for (const ChangeBetweenFixes& its : changes) {
+    sum += its.readout_variance_rad2.array() / its.fix_variance_rad2.array();
   }
-  return noise_rad;
+  return sum / static_cast<double>(changes.size());
+}
+
+/// By how much the 1-sigma of the fixes is larger than they say, about one axis, where the noise of the readings is as
+/// it says. Needs changes.
+double factor_of_fixes(std::span<const ChangeBetweenFixes> changes, int axis) {
+  constexpr double kLeast = 1e-4;
+  constexpr double kClose = 1e-3;
+  constexpr int kMostSteps = 20;  // two, where all changes have the same variances
+  const double readout = readout_by_fix(changes)(axis);
+  double square = 1;
+  for (int step = 0; step < kMostSteps; ++step) {
+    std::vector<double> sizes;
+    for (const ChangeBetweenFixes& its : changes) {
+      const double variance = 2 * (square * its.fix_variance_rad2(axis) + its.readout_variance_rad2(axis));
+      sizes.push_back(std::abs(its.change_rad(axis)) / std::sqrt(variance));
+    }
+    const double before = square;
+    square = std::max(square + (std::pow(sigma_without_outliers(sizes), 2) - 1) * (square + readout), kLeast);
+    if (std::abs(square - before) < kClose * before) {
+      break;
+    }
+  }
+  return std::sqrt(square);
+}
+
+/// The same of a pass, about all axes. Noise may be more for a part of it: the root mean square over stretches, without
+/// outliers, of which no stretch counts as more than three times the median of all.
+Eigen::Vector3d factors_of_fixes(std::span<const ChangeBetweenFixes> changes) {
+  constexpr double kMost = 3;
+  const std::size_t stretches = std::max<std::size_t>(changes.size() / kFixPairsOfStretch, 1);
+  Eigen::Vector3d factors;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> of_stretches;
+    for (std::size_t n = 0; n < stretches; ++n) {
+      const std::size_t begin = n * changes.size() / stretches;
+      const std::size_t end = (n + 1) * changes.size() / stretches;
+      of_stretches.push_back(factor_of_fixes(changes.subspan(begin, end - begin), axis));
+    }
+    std::ranges::sort(of_stretches);
+    const double most = kMost * of_stretches[of_stretches.size() / 2];
+    double square = 0;
+    for (const double factor : of_stretches) {
+      square += std::pow(std::min(factor, most), 2) / static_cast<double>(stretches);
+    }
+    factors(axis) = std::sqrt(square);
+  }
+  return factors;
 }
 
 /// The noise of the star tracker that the changes show, where it differs from the settings.
 std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
-                                                        const std::vector<Eigen::Vector3d>& changes_rad) {
-  const Eigen::Vector3d& given = pass.settings.star_tracker_noise_rad;
-  const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
-  // Neighbours share a fix, so that n changes tell a sigma to the root of 3/4n.
-  const double chance = 3 * std::sqrt(0.75 / static_cast<double>(changes_rad.size()));
-  const bool other = ((found - given).array().abs() > std::max(kNoiseTolerance, chance) * given.array()).any();
-  return other ? std::optional(found) : std::nullopt;
+                                                        const std::vector<ChangeBetweenFixes>& changes) {
+  const Eigen::Array3d factors = factors_of_fixes(changes);
+  // Neighbours share a fix, so that n changes tell a sigma to the root of 3/4n, of which the readings have a part.
+  const Eigen::Array3d chance =
+      3 * std::sqrt(0.75 / static_cast<double>(changes.size())) * (1 + readout_by_fix(changes) / factors.square());
+  const bool other = ((factors - 1).abs() > (chance * factors).max(kNoiseTolerance)).any();
+  return other ? std::optional<Eigen::Vector3d>(pass.settings.star_tracker_noise_rad.array() * factors) : std::nullopt;
 }
 
 /// Whether a drift model has all coefficients that the priors of the gyros name.
@@ -429,7 +458,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
       Trial(pass, screened, with_everything(options, asked, largest_model), noise, by_eq1 ? &by_eq1->trial : nullptr),
       {},
       {}};
-  const std::vector<Eigen::Vector3d> changes = free.trial.changes_rad();
+  const std::vector<ChangeBetweenFixes> changes = free.trial.changes();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(free.trial, pass.settings, asked, false, decision);

@@ -266,13 +266,17 @@ std::vector<Forecast> Trial::forecasts() const {
   return field_ ? std::vector<Forecast>() : ground::forecasts(problem_, found_, models_up_to(drift_model_));
 }
 
-std::vector<Eigen::Vector3d> Trial::changes_rad() const {
+std::vector<ChangeBetweenFixes> Trial::changes() const {
   constexpr Duration kClose = std::chrono::seconds(100);  // over which nothing slow changes by as much as the noise
   const CalibrationSetup& setup = problem_.setup().on_board;
-  std::vector<Eigen::Vector3d> changes;
-  std::optional<Eigen::Quaterniond> last;
-  Time last_fix_t{};
-  Eigen::Vector3d last_variance{0, 0, 0};
+  struct Difference {
+    Time fix_t;
+    Eigen::Quaterniond apart;
+    Eigen::Vector3d fix_variance;
+    Eigen::Vector3d readout_variance;
+  };
+  std::vector<ChangeBetweenFixes> changes;
+  std::optional<Difference> last;
   problem_.go_along_momenta(found_.solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr || moment.fix->fix.head != 0) {
       return;
@@ -281,18 +285,15 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
     if (!by_gyros) {
       return;
     }
-    const Eigen::Quaterniond apart =
-        by_gyros.value().C_in_c.quaternion().conjugate() * moment.fix->fix.q_in_c.normalized();
     const StarFix& fix = moment.fix->fix;
-    const Eigen::Vector3d variance = (fix_noise(setup, fix) + noise_by_readout(setup, moment)).diagonal();
-    if (last && fix.t - last_fix_t < kClose) {
-      const Eigen::Vector3d change = Rot<C, C>::assume(last->conjugate() * apart).log().raw();
-      const Eigen::Vector3d expected = ((variance + last_variance) / 2).cwiseSqrt();
-      changes.emplace_back(change.cwiseProduct(setup.star_trackers[0].noise_rad).cwiseQuotient(expected));
+    const Difference now{fix.t, by_gyros.value().C_in_c.quaternion().conjugate() * fix.q_in_c.normalized(),
+                         fix_noise(setup, fix).diagonal(), noise_by_readout(setup, moment).diagonal()};
+    if (last && now.fix_t - last->fix_t < kClose) {
+      changes.push_back({Rot<C, C>::assume(last->apart.conjugate() * now.apart).log().raw(),
+                         (last->fix_variance + now.fix_variance) / 2,
+                         (last->readout_variance + now.readout_variance) / 2});
     }
-    last = apart;
-    last_fix_t = fix.t;
-    last_variance = variance;
+    last = now;
   });
   return changes;
 }

@@ -29,6 +29,15 @@ struct LogEvidence {
 /// so that small states have evidence as well.
 [[nodiscard]] LogEvidence log_evidence_of(const Eigen::MatrixXd& information, const Eigen::VectorXd& y);
 
+/// Of the difference between star tracker and gyros from one fix to the next, about c x, y, z: everything slow cancels.
+struct ChangeBetweenFixes {
+  Eigen::Vector3d change_rad;
+  /// Of each of the two, in the mean, as the setup and the fixes say: its square is twice their sum where they are
+  /// right.
+  Eigen::Vector3d fix_variance_rad2;
+  Eigen::Vector3d readout_variance_rad2;
+};
+
 /// The whole pass with one choice of states. Further states are judged by ln of the Bayes factor for their being free
 /// instead of zero.
 class Trial {
@@ -83,10 +92,8 @@ class Trial {
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
-  /// Change of the difference between the first star tracker and the gyros from fix to fix, about c x, y, z: everything
-  /// slow cancels. In the scale in which its square is, in the mean, twice that of the setup's noise of a fix where
-  /// fixes and readings scatter as they say.
-  [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
+  /// From fix to fix of the first star tracker, in the order of their times.
+  [[nodiscard]] std::vector<ChangeBetweenFixes> changes() const;
 
  private:
   /// Estimates of the components of a further state and their covariance, in units of the 1-sigmas of their prior.

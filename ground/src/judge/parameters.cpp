@@ -178,20 +178,27 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
     return;
   }
   const Eigen::Vector3d& axis = observability.weakest_axis_c;
+  const bool is_about_all = observability.best_sigma_rad > kWeakAlignment_rad;
+  const std::string what =
+      is_about_all
+          ? "The attitude hardly changes in space: the alignment of each gyro about any axis cannot be separated from "
+            "its initial direction."
+          : fmt::format(
+                "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space "
+                "(the orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about "
+                "it cannot be separated from its initial direction.",
+                axis.x(), axis.y(), axis.z());
   const bool believes = run.options.estimator == Estimator::kPaper;
   add(findings, FindingCode::kWeakAlignmentAxis,
-      fmt::format(
-          "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
-          "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
-          "separated from its initial direction. {} The attitude does not suffer from that while the flight stays "
-          "steady.",
-          axis.x(), axis.y(), axis.z(),
-          believes ? "Estimator paper takes noise for information there: its sigmas about this axis are too small."
-                   : "The sigmas say so."),
+      fmt::format("{} {} The attitude does not suffer from that while the flight stays steady.", what,
+                  believes ? "Estimator paper takes noise for information there: its sigmas of that are too small."
+                           : "The sigmas say so."),
       std::isfinite(observability.sigma_rad)
-          ? fmt::format("about {} at best about this axis from the fixes alone", angle_text(observability.sigma_rad))
+          ? fmt::format("about {} at best about {} from the fixes alone", angle_text(observability.sigma_rad),
+                        is_about_all ? "one axis" : "this axis")
           : "the fixes alone do not determine it",
-      "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
+      fmt::format("Fly slews about {} axes during the calibration: ten minutes of 10° and more suffice.",
+                  is_about_all ? "two" : "the other"));
   // What is not known is in the sigmas, and by them the forecast for flight as in the pass is made.
   const std::optional<OpenLoopForecast>& forecast = run.calibration.forecast;
   if (!believes && forecast && forecast->need && forecast->need->met) {
@@ -229,11 +236,15 @@ AlignmentObservability alignment_observability(const StarTrackerTelemetry& track
   close_stretch();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
   AlignmentObservability result;
-  result.weakest_axis_c = solver.eigenvectors().col(0);
   // The tracker's own noise makes a steady axis seem to move.
-  const double noise =
-      total * (tracker_noise_rad.cwiseAbs2().array() * (1 - result.weakest_axis_c.array().square())).sum();
-  result.sigma_rad = fix_noise_rad / std::sqrt(std::max(solver.eigenvalues()(0) - noise, 0.0));
+  const auto sigma_about = [&](int axis) {
+    const Eigen::Array3d axis_c = solver.eigenvectors().col(axis);
+    const double noise = total * (tracker_noise_rad.cwiseAbs2().array() * (1 - axis_c.square())).sum();
+    return fix_noise_rad / std::sqrt(std::max(solver.eigenvalues()(axis) - noise, 0.0));
+  };
+  result.weakest_axis_c = solver.eigenvectors().col(0);
+  result.sigma_rad = sigma_about(0);
+  result.best_sigma_rad = sigma_about(2);
   return result;
 }
 

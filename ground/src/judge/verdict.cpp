@@ -107,4 +107,11 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   return verdict_of(std::move(findings));
 }
 
+Verdict judge_use_of_fixes(const Statistics& statistics) {
+  std::vector<Finding> findings;
+  judge_number_of_fixes(statistics, findings);
+  judge_rejections(statistics, findings);
+  return verdict_of(std::move(findings));
+}
+
 }  // namespace trihedron::ground

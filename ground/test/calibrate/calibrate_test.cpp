@@ -1060,6 +1060,21 @@ TEST(Calibrate, TakesNoiseOfTheStarTrackerThatIsMoreForAPartOfThePassForItsMean)
   EXPECT_LT(nees_of(two_hours().truth, run.calibration), 40);
 }
 
+TEST(Calibrate, FindsTheNoiseOfAStarTrackerThatIsToldFarBelowThatOfTheReadings) {
+  const Eigen::Vector3d noise_rad = two_hours().pass.settings.star_tracker_noise_rad;
+  Pass pass = two_hours().pass;
+  pass.settings.star_tracker_noise_rad /= 5;
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    CalibrationOptions options;
+    options.estimator = estimator;
+    const CalibrationRun run = calibrate(pass, options);
+    ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+    const Eigen::Array3d ratio = run.options.star_tracker_noise_rad->cwiseQuotient(noise_rad).array();
+    EXPECT_LT((ratio - 1).abs().maxCoeff(), 0.07) << ratio.transpose();
+    EXPECT_TRUE(run.calibration.verdict.trustworthy);
+  }
+}
+
 TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
   Scenario scenario = scenario_of_three(9, std::chrono::hours(3));
   scenario.star_tracker.noise_rad *= 1.5;

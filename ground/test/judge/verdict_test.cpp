@@ -579,6 +579,15 @@ TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
   EXPECT_FALSE(verdict.trustworthy);
 }
 
+TEST(Verdict, NamesNoAxisWhereNoneMoves) {
+  auto pass = good_pass();
+  std::ranges::fill(pass.star_tracker.q_in_c, Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5));
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("weak-alignment-axis"));
+  EXPECT_THAT(verdict.findings[0].text, HasSubstr("about any axis"));
+  EXPECT_THAT(verdict.findings[0].cure, HasSubstr("about two axes"));
+}
+
 TEST(Verdict, OfSteadyFlightIsTrustworthyForAStatedNeedThatIsMet) {
   auto pass = good_pass();
   pass.star_tracker = flight(0);
@@ -1085,6 +1094,7 @@ TEST(AlignmentObservability, IsNilWhereTheAxisNeverMoves) {
   const auto steady = alignment_observability(flight(0), {0, 0, 0}, 1.45e-5);
   EXPECT_NEAR(std::abs(steady.weakest_axis_c.y()), 1, 1e-6);
   EXPECT_GT(steady.sigma_rad, 1e-3);  // infinite but for rounding
+  EXPECT_LT(steady.best_sigma_rad, 2e-6);
 }
 
 TEST(AlignmentObservability, DoesNotTakeTheNoiseOfTheTrackerForMotion) {
