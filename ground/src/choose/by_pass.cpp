@@ -390,6 +390,39 @@ Settled settle_with_noise(const Pass& pass, const Screened& screened, const Cali
   return settled;
 }
 
+/// Takes an error at orbital period for none where the pass is not likelier with it than with drift alone, whose
+/// spectrum is then found anew: found with that error free, it leaves the drift that the error stands for out, and what
+/// it leaves out is evidence of the error.
+void look_without_orbital_error(const Pass& pass, const Screened& screened, const CalibrationOptions& undecided,
+                                const DriftModelId& largest_model, bool wandering_is_open, const AllFree& free,
+                                const Progress& progress, Settled& settled) {
+  constexpr FurtherState kError = FurtherState::kOrbitalError;
+  constexpr double kBeyondDoubt = 30;
+  if (!undecided.drift_field || undecided.further_states[kError] != Choice::kAuto ||
+      !settled.decision.options.further_states.is_on(kError)) {
+    return;
+  }
+  const LogEvidence log_evidence = free.trial.log_evidence(kError);
+  if (log_evidence.value > kBeyondDoubt) {
+    return;
+  }
+  begin_stage(progress, "looks at drift in place of an error at orbital period");
+  CalibrationOptions without = undecided;
+  without.further_states[kError] = Choice::kOff;
+  AllFree others{
+      Trial(pass, screened, with_everything(without, without, largest_model), free.trial.problem().setup().noise()),
+      {},
+      {}};
+  Settled other = settle_with_noise(pass, screened, without, largest_model, wandering_is_open, others, progress);
+  const double gain = settled.decision.log_likelihood - other.decision.log_likelihood + log_evidence.value -
+                      log_evidence.by_prior_as_it_is;
+  if (gain > enough_for(kError, settled.more_noise)) {
+    return;
+  }
+  other.decision.evidence.push_back({kError, gain, false});
+  settled = std::move(other);
+}
+
 /// Settles the states in doubt: one after the other is taken in where the whole pass, with the noise that is then the
 /// likeliest, is by so much likelier with it. That likelihood is by the prior as it is: narrower ones add to it what
 /// they add to the evidence.
@@ -416,6 +449,7 @@ Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOpt
     }
   }
   settled.decision.evidence.insert(settled.decision.evidence.end(), taken_in.begin(), taken_in.end());
+  look_without_orbital_error(pass, screened, undecided, largest_model, wandering_is_open, free, progress, settled);
   return settled;
 }
 

@@ -10,6 +10,7 @@
 #include "choose/decide.hpp"
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -219,6 +220,21 @@ TEST(FieldOrError, IsDriftWhereTheAngleShowsIt) {
   ASSERT_TRUE(run.field_or_error);
   EXPECT_GT(run.field_or_error->field_by_angle, 5);  // from which the verdict says nothing
   EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorOrDrift));
+}
+
+TEST(OrbitalError, IsNotTakenForDriftWhoseSpectrumWasFoundBesideIt) {
+  Scenario scenario;  // with drift outside eq. (1)
+  scenario.seed = 1616976969;
+  scenario.attitude.slews = std::vector<Slew>{};
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
+  EXPECT_FALSE(run.options.further_states.is_on(FurtherState::kOrbitalError)) << states_of(run);
+  const auto evidence = std::ranges::find(run.evidence, FurtherState::kOrbitalError, &Evidence::state);
+  ASSERT_NE(evidence, run.evidence.end());
+  EXPECT_LT(evidence->log_bayes_factor, 3);
+  EXPECT_TRUE(evidence->open_sigma.has_value());
+  const ErrorStatistics off = statistics(attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c));
+  EXPECT_LT(off.normalised_square.value(), 1.5);
 }
 
 /// Turns about its vertical so that its panels follow the Sun, 25° out of the plane of the orbit.
