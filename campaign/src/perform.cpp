@@ -232,7 +232,7 @@ RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
 
 namespace {
 
-/// Of its fixes, the first among them. Those at which the filter began anew count as rejected.
+/// Of its fixes, the first among them. Those at which the filter began anew or widened its sigmas count as rejected.
 Statistics statistics_of(const lanes::FilterResult& result) {
   Statistics statistics;
   statistics.fixes = static_cast<long>(1 + result.fixes_judged);

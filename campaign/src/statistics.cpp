@@ -6,6 +6,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 namespace trihedron::campaign {
 namespace {
@@ -117,7 +118,9 @@ std::optional<RankCorrelation> rank_correlation(std::span<const double> x, std::
     }
   }
   constexpr std::size_t kFewest = 10;
-  if (first.size() < kFewest) {
+  constexpr std::size_t kFewestOfTwoValues = 40;
+  const bool has_two_values = std::set(first.begin(), first.end()).size() == 2;
+  if (first.size() < (has_two_values ? kFewestOfTwoValues : kFewest)) {
     return std::nullopt;
   }
   first = ranks_of(first);

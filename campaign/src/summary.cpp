@@ -372,7 +372,7 @@ void judge_failures(std::span<const RunRecord> records, CampaignSummary& summary
 }
 
 std::string without_numbers(const std::string& reason) {
-  static const std::regex kNumber("[0-9][0-9.]*(e[-+]?[0-9]+)?");
+  static const std::regex kNumber("-?[0-9][0-9.]*(e[-+]?[0-9]+)?");
   return std::regex_replace(reason, kNumber, "0");
 }
 

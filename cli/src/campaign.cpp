@@ -124,11 +124,13 @@ class Campaign {
             journal_file, {}, fmt::format("holds {} of {} runs of this campaign", journal->records.size(), plan().runs),
             "add --resume to go on with it, or give another directory");
       }
-      if (journal->damaged > 0) {
+      if (journal->damaged > 0 && journal->records.size() < plan().runs) {
         say(fmt::format("trihedron: {}: {} damaged, performed again\n", printable(journal_file.string()),
                         journal->damaged == 1 ? "1 run is" : fmt::format("{} runs are", journal->damaged)));
       }
-      if (const std::size_t lost = std::erase_if(journal->records, campaign::was_lost); lost > 0) {
+      // Only where it cannot take the others with it.
+      const std::size_t lost = job_ != nullptr ? std::erase_if(journal->records, campaign::was_lost) : 0;
+      if (lost > 0) {
         say(fmt::format("trihedron: {}: {} with {} process, performed again\n", printable(journal_file.string()),
                         lost == 1 ? "1 run was lost" : fmt::format("{} runs were lost", lost),
                         lost == 1 ? "its" : "their"));

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from campaign_test import CAMPAIGN, FILTERS, flown, long_one, records, table, until
+from campaign_test import CAMPAIGN, FILTERS, flown, long_one, lose, records, table, until
 from outputs_test import faults
 from program import BUILD, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
 
@@ -153,6 +153,19 @@ def test_a_job_gives_the_table_of_one_process(alone, tmp_path, ranks, jobs):
     assert result.stdout.count("Test: 12 runs") == 1
     assert table(tmp_path / "out") == table(directory / "out")
     assert sorted(os.listdir(tmp_path / "out")) == ["report.html", "runs.journal", "runs.nc", "times.csv"]
+
+
+@needs_mpi
+def test_runs_that_were_lost_are_performed_again(alone, tmp_path):
+    directory, status = alone
+    shutil.copytree(directory / "out", tmp_path / "out")
+    lose(tmp_path / "out" / "runs.journal", 7)
+    resume = mpirun(1, "--quiet", "campaign", directory / "c.toml", "-o", tmp_path / "out", "--resume")
+    result = subprocess.run(resume, capture_output=True, text=True)
+    assert result.returncode == status, result.stderr
+    assert "1 run was lost with its process, performed again" in result.stderr
+    assert table(tmp_path / "out") == table(directory / "out")
+    assert "lost" not in subprocess.run(resume, capture_output=True, text=True).stderr
 
 
 @needs_mpi

@@ -337,6 +337,13 @@ class DistributionReader {
     if (const toml::node* names = table_.get("names")) {
       read_names(*names);
     }
+    for (std::size_t i = 1; i < list.size() && input.numbers.empty(); ++i) {
+      if (std::ranges::find(input.options.begin(), input.options.begin() + static_cast<std::ptrdiff_t>(i),
+                            input.options[i]) != input.options.begin() + static_cast<std::ptrdiff_t>(i)) {
+        refuse(list[i], fmt::format("{} is there twice", in_quotes(input.options[i])),
+               "give each value once, under a name of its own; a choice has weights");
+      }
+    }
     if (input.distribution.kind == Kind::kChoice) {
       read_weights();
     }
@@ -353,13 +360,7 @@ class DistributionReader {
     input.numbers.clear();
     input.unit.clear();
     for (std::size_t i = 0; i < names->size(); ++i) {
-      std::string name = reader_.text((*names)[i], "names");
-      if (std::find(input.options.begin(), input.options.begin() + static_cast<std::ptrdiff_t>(i), name) !=
-          input.options.begin() + static_cast<std::ptrdiff_t>(i)) {
-        refuse((*names)[i], fmt::format("{} is the name of two values", in_quotes(name)),
-               "give each a name of its own");
-      }
-      input.options[i] = std::move(name);
+      input.options[i] = reader_.text((*names)[i], "names");
     }
   }
 
@@ -568,7 +569,7 @@ struct CampaignFile::Content {
     return drawn_into;
   }
 
-  /// The same with all inputs of its kind, the others in the middle of what can be drawn for them.
+  /// The scenario with all its inputs drawn, the others in the middle of their numbers or the first of their words.
   [[nodiscard]] toml::table drawn_among_others(std::size_t one, double draw) const {
     std::vector<double> draws;
     for (std::size_t i = 0; i < varied.size(); ++i) {
@@ -580,8 +581,8 @@ struct CampaignFile::Content {
         draws[i] = following(input, draws[input.followed]);
       }
     }
-    toml::table drawn_into = varied[one].input.is_setting() ? settings : base;
-    put_draws(drawn_into, draws, varied[one].input.is_setting());
+    toml::table drawn_into = base;
+    put_draws(drawn_into, draws, false);
     return drawn_into;
   }
 
@@ -714,7 +715,7 @@ struct CampaignFile::Content {
       try {
         try_draw(varied[one], follows ? following(input, end) : end, check);
       } catch (const InputRefused&) {
-        if (!is_possible_among_others(varied[one], root, end, check)) {
+        if (input.is_setting() || !is_possible_among_others(varied[one], root, end, check)) {
           throw;
         }
       }

@@ -172,7 +172,8 @@ std::optional<RunRecord> parse_record(std::string_view line) {
 }
 
 bool is_barely_begun(const fs::path& file, const CampaignIdentity& identity) {
-  return first_line(identity).starts_with(TextFile(file).text());
+  const std::string line = first_line(identity);
+  return fs::file_size(file) <= line.size() && line.starts_with(TextFile(file).text());
 }
 
 Journal read_journal(const fs::path& file) {

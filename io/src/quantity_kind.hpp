@@ -64,6 +64,7 @@ inline constexpr QuantityKind kAcceleration{"an angular acceleration", units::kA
 inline constexpr QuantityKind kRateWalk{"a random walk of a rate", units::kRateWalks, "1e-9rad/s/s^0.5",
                                         limits::kRateWalk_rad_s_sqrt_s};  ///< rad/s/√s
 
+/// All of them: by their units numbers are told from words.
 inline constexpr std::array kQuantityKinds = {&kDuration, &kAngle,     &kRate,         &kRandomWalk,
                                               &kLength,   &kFrequency, &kAcceleration, &kRateWalk};
 

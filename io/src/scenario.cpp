@@ -328,7 +328,7 @@ void read_gyro(const toml::table& table, const fs::path& file, const std::string
   read_fields(table, file, name, fields);
   if (const toml::node* size = table.get("misalignment_magnitude"); size != nullptr && gyro.misalignment_rad) {
     TomlTable(table, file, name)
-        .refuse(*size, "\"misalignment\" and \"misalignment_magnitude\" are both there",
+        .refuse(*size, "\"misalignment_magnitude\" stands beside a \"misalignment\" of this gyro, which has its size",
                 "keep one of them: the magnitude is that of a misalignment that is drawn");
   }
 }

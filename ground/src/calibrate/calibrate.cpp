@@ -365,6 +365,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.orbital_error_over_drift = decision.orbital_error_over_drift;
+  run.moved_by_orbital_drift_rad = decision.moved_by_orbital_drift_rad;
   run.orbital_error_over_field = decision.orbital_error_over_field;
   run.field_or_error = decision.field_or_error;
   run.against_field = decision.against_field;

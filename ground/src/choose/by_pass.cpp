@@ -22,11 +22,13 @@ constexpr std::size_t kLeastFixPairs = 100;
 /// So many tell the noise of a stretch of the pass to some percent.
 constexpr std::size_t kFixPairsOfStretch = 1000;
 
-/// Noise of the readings over that of a fix, as they say, about c x, y, z: ratio of the variances, in the mean.
-Eigen::Array3d readout_by_fix(std::span<const ChangeBetweenFixes> changes) {
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
+/// The part that noise of the fixes has in the changes about an axis, in the mean, where it is so many times what they
+/// say.
+double part_of_fixes(std::span<const ChangeBetweenFixes> changes, int axis, double square) {
+  double sum = 0;
   for (const ChangeBetweenFixes& its : changes) {
-    sum += its.readout_variance_rad2.array() / its.fix_variance_rad2.array();
+    const double by_fix = square * its.fix_variance_rad2(axis);
+    sum += by_fix / (by_fix + its.readout_variance_rad2(axis));
   }
   return sum / static_cast<double>(changes.size());
 }
@@ -36,8 +38,7 @@ Eigen::Array3d readout_by_fix(std::span<const ChangeBetweenFixes> changes) {
 double factor_of_fixes(std::span<const ChangeBetweenFixes> changes, int axis) {
   constexpr double kLeast = 1e-4;
   constexpr double kClose = 1e-3;
-  constexpr int kMostSteps = 20;  // two, where all changes have the same variances
-  const double readout = readout_by_fix(changes)(axis);
+  constexpr int kMostSteps = 20;  // two to four are usual
   double square = 1;
   for (int step = 0; step < kMostSteps; ++step) {
     std::vector<double> sizes;
@@ -45,8 +46,10 @@ double factor_of_fixes(std::span<const ChangeBetweenFixes> changes, int axis) {
       const double variance = 2 * (square * its.fix_variance_rad2(axis) + its.readout_variance_rad2(axis));
       sizes.push_back(std::abs(its.change_rad(axis)) / std::sqrt(variance));
     }
+    // Newton's step of the logarithm of the scatter, taken for small: of that of the fixes in it.
     const double before = square;
-    square = std::max(square + (std::pow(sigma_without_outliers(sizes), 2) - 1) * (square + readout), kLeast);
+    const double more = (std::pow(sigma_without_outliers(sizes), 2) - 1) / part_of_fixes(changes, axis, square);
+    square = std::max(square * (1 + more), kLeast);
     if (std::abs(square - before) < kClose * before) {
       break;
     }
@@ -82,9 +85,12 @@ Eigen::Vector3d factors_of_fixes(std::span<const ChangeBetweenFixes> changes) {
 std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
                                                         const std::vector<ChangeBetweenFixes>& changes) {
   const Eigen::Array3d factors = factors_of_fixes(changes);
-  // Neighbours share a fix, so that n changes tell a sigma to the root of 3/4n, of which the readings have a part.
-  const Eigen::Array3d chance =
-      3 * std::sqrt(0.75 / static_cast<double>(changes.size())) * (1 + readout_by_fix(changes) / factors.square());
+  // Neighbours share a fix, so that n changes tell the scatter to the root of 3/4n, in which the fixes have a part.
+  Eigen::Array3d part;
+  for (int axis = 0; axis < 3; ++axis) {
+    part(axis) = part_of_fixes(changes, axis, factors(axis) * factors(axis));
+  }
+  const Eigen::Array3d chance = 3 * std::sqrt(0.75 / static_cast<double>(changes.size())) / part;
   const bool other = ((factors - 1).abs() > (chance * factors).max(kNoiseTolerance)).any();
   return other ? std::optional<Eigen::Vector3d>(pass.settings.star_tracker_noise_rad.array() * factors) : std::nullopt;
 }
@@ -402,7 +408,9 @@ void look_without_orbital_error(const Pass& pass, const Screened& screened, cons
       !settled.decision.options.further_states.is_on(kError)) {
     return;
   }
-  const LogEvidence log_evidence = free.trial.log_evidence(kError);
+  const bool wanders = settled.decision.options.further_states.is_on(FurtherState::kWanderingDrift);
+  const LogEvidence log_evidence =
+      (wanders && free.wandering ? free.wandering->first : free.trial).log_evidence(kError);
   if (log_evidence.value > kBeyondDoubt) {
     return;
   }
@@ -448,8 +456,8 @@ Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOpt
       ++i;
     }
   }
-  settled.decision.evidence.insert(settled.decision.evidence.end(), taken_in.begin(), taken_in.end());
   look_without_orbital_error(pass, screened, undecided, largest_model, wandering_is_open, free, progress, settled);
+  settled.decision.evidence.insert(settled.decision.evidence.end(), taken_in.begin(), taken_in.end());
   return settled;
 }
 

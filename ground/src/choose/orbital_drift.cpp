@@ -169,6 +169,17 @@ WithDrift with_orbital_drift(const Pass& pass, const Screened& screened, Calibra
   return {std::move(options), std::move(decision), gain, counts};
 }
 
+/// How far the alignment of each gyro is from that without drift at orbital period, about c axes, rad.
+std::vector<Eigen::Vector3d> moved_from(const Decision& without, const Decision& with) {
+  std::vector<Eigen::Vector3d> moved_rad;
+  for (int k = 0; k < with.nearby->layout.gyros; ++k) {
+    const Eigen::Matrix3d& before = without.nearby->solution.gyros[k].C_c_b;
+    const Eigen::Matrix3d& after = with.nearby->solution.gyros[k].C_c_b;
+    moved_rad.push_back(Rot<C, C>::assume(Eigen::Matrix3d(after * before.transpose())).log().raw());
+  }
+  return moved_rad;
+}
+
 }  // namespace
 
 bool is_all_that_is_left(const Decision& by_drift) {
@@ -232,11 +243,13 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
       WithDrift both = with(with_error, at_orbit.more_for_both(), gain_of_drift);
       if (both.counts) {
         both.decision.evidence.push_back({kDrift, both.gain - gain_of_drift, true});
+        both.decision.moved_by_orbital_drift_rad = moved_from(decision, both.decision);
         return std::move(both).take(asked);
       }
     }
     if (is_drift) {
       by_drift->decision.evidence.push_back({kDrift, by_drift->gain, true});
+      by_drift->decision.moved_by_orbital_drift_rad = moved_from(decision, by_drift->decision);
       by_drift->decision.orbital_error_over_drift =
           at_orbit.has_error() ? std::optional(-by_drift->gain) : std::nullopt;
       return (*std::move(by_drift)).take(asked);
@@ -261,6 +274,7 @@ void keep_what_comes_back(const Decision& before, Decision& again) {
   std::ranges::copy_if(before.evidence, std::back_inserter(again.evidence),
                        [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
   again.orbital_error_over_drift = before.orbital_error_over_drift;
+  again.moved_by_orbital_drift_rad = before.moved_by_orbital_drift_rad;
   again.orbital_error_over_field = before.orbital_error_over_field;
   again.field_or_error = before.field_or_error;
 }

@@ -11,6 +11,7 @@
 
 #include "judge/findings.hpp"
 #include "model/orbital_rate.hpp"
+#include "trihedron/records/text.hpp"
 #include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
@@ -111,6 +112,34 @@ const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind, 
   return largest;
 }
 
+/// The states hold a sine about each axis. Drift that comes back with the orbit in another shape leaves a part of what
+/// they moved, and where that is many of its sigmas the part is as well.
+void look_at_what_orbital_drift_moved(const CalibrationRun& run, Finding& finding) {
+  constexpr double kMost = 3;  // sigmas
+  double most = kMost;
+  std::string what;
+  for (std::size_t k = 0; k < run.moved_by_orbital_drift_rad.size(); ++k) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const ParameterId alignment = ParameterId::alignment(k, axis);
+      const double moved_rad = run.moved_by_orbital_drift_rad[k](axis);
+      const double sigmas = std::abs(moved_rad) / sigma_of(run.calibration, alignment);
+      if (sigmas > most) {
+        most = sigmas;
+        what =
+            fmt::format("; it moved {} by {}, {:.1f} of its sigmas", name_of(alignment), angle_text(moved_rad), sigmas);
+      }
+    }
+  }
+  if (!what.empty()) {
+    finding.text +=
+        " It is taken for a sine about each axis, and moved an alignment by many of its sigmas: drift of "
+        "another shape would move it to another place.";
+    finding.evidence += what;
+    finding.cure += " Fly slews about two axes, which tell alignments from such drift.";
+    finding.severity = Severity::kDoNotUse;
+  }
+}
+
 void judge_what_comes_back(const AtOrbitalPeriod& its, const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
   const bool is_error = its.state == FurtherState::kOrbitalError;
@@ -146,6 +175,9 @@ void judge_what_comes_back(const AtOrbitalPeriod& its, const CalibrationRun& run
       std::string(may_be_other ? its.causes_of_both : its.cause));
   if (may_be_other) {
     findings.back().severity = Severity::kDoNotUse;
+  }
+  if (!is_error) {
+    look_at_what_orbital_drift_moved(run, findings.back());
   }
 }
 

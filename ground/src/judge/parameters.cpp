@@ -195,7 +195,7 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
                            : "The sigmas say so."),
       std::isfinite(observability.sigma_rad)
           ? fmt::format("about {} at best about {} from the fixes alone", angle_text(observability.sigma_rad),
-                        is_about_all ? "one axis" : "this axis")
+                        is_about_all ? "the axis that moved least" : "this axis")
           : "the fixes alone do not determine it",
       fmt::format("Fly slews about {} axes during the calibration: ten minutes of 10° and more suffice.",
                   is_about_all ? "two" : "the other"));

@@ -98,6 +98,44 @@ TEST_P(FixCovariances, GiveEachFixItsWeight) {
 INSTANTIATE_TEST_SUITE_P(Estimators, FixCovariances,
                          testing::Values(Estimator::kInvariant, Estimator::kPaper, Estimator::kBatch));
 
+/// Every second fix twenty times as noisy, beside readings that are noisier than the others; told is a factor of it.
+CalibrationRun of_good_and_poor_fixes(double told) {
+  constexpr double kGood_rad = 1 * kArcsecond;
+  constexpr double kPoor_rad = 20 * kArcsecond;
+  Scenario scenario = scenario_in_eq1(11, std::chrono::hours(3));
+  scenario.star_tracker.noise_rad.setConstant(kGood_rad);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = 9 * kArcsecond;
+  }
+  Pass pass = sim::simulate(scenario).pass;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    double variance = kGood_rad * kGood_rad;
+    if (i % 2 == 1) {
+      const Eigen::Vector3d error = kPoor_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
+      pass.star_tracker.q_in_c[i] = pass.star_tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+      variance += kPoor_rad * kPoor_rad;
+    }
+    pass.star_tracker.covariances.push_back(told_as(told * told * variance * Eigen::Matrix3d::Identity()));
+  }
+  return calibrate(pass, CalibrationOptions());
+}
+
+TEST(FindNoise, LeavesCovariancesThatDifferAsTheyAreWhereTheyAreRight) {
+  const CalibrationRun run = of_good_and_poor_fixes(1);
+  EXPECT_FALSE(run.options.star_tracker_noise_rad.has_value()) << run.options.star_tracker_noise_rad->transpose();
+  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.2);
+}
+
+TEST(FindNoise, OfCovariancesThatDifferAndAreTooSmall) {
+  const CalibrationRun run = of_good_and_poor_fixes(0.5);
+  ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+  const Eigen::Vector3d factor = *run.options.star_tracker_noise_rad / kArcsecond;  // told is 1″
+  EXPECT_LT((factor - Eigen::Vector3d(2, 2, 2)).cwiseAbs().maxCoeff(), 0.2) << factor.transpose();
+  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.3);
+}
+
 TEST(FindNoise, OfCovariancesThatAreTooSmall) {
   Pass pass = noisy_by_turns();
   pass.settings.star_tracker_noise_rad /= 2;

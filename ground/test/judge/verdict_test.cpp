@@ -253,6 +253,14 @@ TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   EXPECT_TRUE(found.trustworthy);
   EXPECT_THAT(found.findings[0].evidence,
               HasSubstr("largest amplitude -4.0e-08 rad/s, the cosine about axis y of gyro 2, 40 sigmas"));
+  auto moved = run;
+  const double sigma_rad = sigma_of(run.calibration, ParameterId::alignment(0, 0));
+  moved.moved_by_orbital_drift_rad = {{-2.9 * sigma_rad, 0, 0}, {0, 0, 0}};
+  EXPECT_TRUE(judge(good_pass(), moved).trustworthy);
+  moved.moved_by_orbital_drift_rad = {{-3.5 * sigma_rad, 0, 0}, {0, 0, 0}};
+  EXPECT_FALSE(judge(good_pass(), moved).trustworthy);
+  EXPECT_THAT(judge(good_pass(), moved).findings[0].evidence, HasSubstr("it moved gyro1.align_x by -"));
+  EXPECT_THAT(judge(good_pass(), moved).findings[0].evidence, HasSubstr("3.5 of its sigmas"));
   run.orbital_error_over_drift = -7;
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
   run.orbital_error_over_drift = -3;

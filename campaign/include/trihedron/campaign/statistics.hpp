@@ -45,8 +45,8 @@ struct RankCorrelation {
   double p_value = 1;  ///< of a larger |rho| by chance, by Student's t with n − 2 degrees of freedom
   std::size_t count = 0;
 };
-/// Pairs with NaN are left out; infinity is a value. Nothing for fewer than 10 pairs, of which Student's t says too
-/// little of what chance does, or where one does not change.
+/// Pairs with NaN are left out; infinity is a value. Nothing for fewer than 10 pairs, or 40 where x has two values
+/// alone, of which Student's t says too little of what chance does; nor where one does not change.
 [[nodiscard]] std::optional<RankCorrelation> rank_correlation(std::span<const double> x, std::span<const double> y);
 
 /// Bounds that hold a mean of χ² over its degrees of freedom with `share`, half of the rest on each side.

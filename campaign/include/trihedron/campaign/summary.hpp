@@ -128,8 +128,8 @@ inline constexpr double kCellQuantile = 0.95;
 struct CampaignSummary {
   std::array<std::size_t, 3> outcomes{};        ///< by RunOutcome
   std::map<std::string, std::size_t> findings;  ///< runs by the codes of their findings
-  std::map<std::string, std::size_t>
-      reasons;  ///< runs that failed, by the reason; the first of those that differ in numbers alone
+  /// Runs that failed, by the reason: by the first of those that differ in numbers alone.
+  std::map<std::string, std::size_t> reasons;
   std::optional<Consistency> nees;             ///< of trustworthy runs
   std::optional<Consistency> nees_of_all;      ///< of all that did not fail
   std::optional<Consistency> nis;              ///< of trustworthy runs

@@ -212,6 +212,8 @@ struct CalibrationRun {
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
+  /// Where drift at orbital period was found: how far that moved the alignment of each gyro, about c axes, rad.
+  std::vector<Eigen::Vector3d> moved_by_orbital_drift_rad;
   /// Where a drift field was found, and eq. (1) alone would show such an error, or aberration, in its place: ln of its
   /// odds against the field.
   std::optional<double> orbital_error_over_field;
