@@ -46,7 +46,7 @@ double factor_of_fixes(std::span<const ChangeBetweenFixes> changes, int axis) {
       const double variance = 2 * (square * its.fix_variance_rad2(axis) + its.readout_variance_rad2(axis));
       sizes.push_back(std::abs(its.change_rad(axis)) / std::sqrt(variance));
     }
-    // Newton's step of the logarithm of the scatter, taken for small: of that of the fixes in it.
+    // What the changes scatter too much is of the fixes alone, which have a part in the scatter.
     const double before = square;
     const double more = (std::pow(sigma_without_outliers(sizes), 2) - 1) / part_of_fixes(changes, axis, square);
     square = std::max(square * (1 + more), kLeast);
