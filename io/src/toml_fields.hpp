@@ -95,7 +95,7 @@ template <class Integer>
 [[nodiscard]] Field whole(std::string_view key, Integer& target, std::string_view about) {
   static constexpr Integer kLeast = std::numeric_limits<Integer>::min();
   // TOML has no larger one.
-  static constexpr Integer kMost = static_cast<Integer>(
+  static constexpr auto kMost = static_cast<Integer>(
       std::min<std::uint64_t>(std::numeric_limits<Integer>::max(), std::numeric_limits<std::int64_t>::max()));
   return {key, about, [] { return whole_schema(kLeast, kMost); },
           [key, &target](const TomlTable& table, const toml::node& node) {
