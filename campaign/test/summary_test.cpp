@@ -74,6 +74,17 @@ TEST(RankCorrelation, HasTheValueOfTheTextbookAndMeanRanksForTies) {
               82 / std::sqrt(82 * 82.5), 1e-12);
 }
 
+TEST(RankCorrelation, OfTwoValuesTakesMorePairs) {
+  std::vector<double> x;
+  std::vector<double> y;
+  for (int i = 0; i < 40; ++i) {
+    x.push_back(i % 2);
+    y.push_back(i);
+  }
+  EXPECT_FALSE(rank_correlation(std::span(x).first(39), std::span(y).first(39)).has_value());
+  EXPECT_TRUE(rank_correlation(x, y).has_value());
+}
+
 TEST(RankCorrelation, IsNoneForFewPairsOrWhatDoesNotChange) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> x = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};

@@ -174,6 +174,10 @@ def test_a_journal_that_is_cut_short_in_its_first_line_holds_no_run(finished):
         assert table(out) == table(finished / "out")
     (out / "runs.journal").write_bytes(head[:300] + b"?")
     refused(run("campaign", finished / "c.toml", "-o", out, "--resume"), INPUT_REFUSED, "no journal")
+    (out / "runs.journal").unlink()
+    (out / "runs.journal").mkdir()
+    result = run("campaign", finished / "c.toml", "-o", out, "--resume")
+    assert result.returncode == INPUT_REFUSED and "runs.journal" in result.stderr and "filesystem error" not in result.stderr
 
 
 @pytest.mark.parametrize("with_signal", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "json_node.hpp"
@@ -173,7 +174,9 @@ std::optional<RunRecord> parse_record(std::string_view line) {
 
 bool is_barely_begun(const fs::path& file, const CampaignIdentity& identity) {
   const std::string line = first_line(identity);
-  return fs::file_size(file) <= line.size() && line.starts_with(TextFile(file).text());
+  std::error_code unknown;  // of what is no file, which read_journal() refuses
+  const std::uintmax_t size = fs::file_size(file, unknown);
+  return !unknown && size <= line.size() && line.starts_with(TextFile(file).text());
 }
 
 Journal read_journal(const fs::path& file) {

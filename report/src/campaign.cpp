@@ -145,21 +145,22 @@ json numbers_of_campaign(const CampaignReportInput& input) {
   const auto quantile_of_trustworthy = [&](std::string_view key, double p) {
     return quantile_number(of_measure(summary.trustworthy, key), p);
   };
-  json rows = {{{"name", "Trustworthy"},
-                {"value", number(static_cast<double>(summary.count(RunOutcome::kTrustworthy)), 0)},
-                {"unit", fmt::format(" of {} runs", number(static_cast<double>(input.records.size()), 0))},
-                {"note", share(RunOutcome::kTrustworthy)}},
-               {{"name", "Do not use"},
-                {"value", number(static_cast<double>(summary.count(RunOutcome::kDoNotUse)), 0)},
-                {"unit", " runs"},
-                {"note", share(RunOutcome::kDoNotUse) +
-                             (are_filters ? ", whose filter began anew" : ", as the calibrations say themselves")}},
-               {{"name", "Failed"},
-                {"value", number(static_cast<double>(summary.count(RunOutcome::kFailed)), 0)},
-                {"unit", " runs"},
-                {"note", share(RunOutcome::kFailed) + ", in no statistic"}},
-               consistency_number("NEES of the parameters", summary.nees, 1),
-               consistency_number("NIS of the fixes", summary.nis, 3)};
+  json rows = {
+      {{"name", "Trustworthy"},
+       {"value", number(static_cast<double>(summary.count(RunOutcome::kTrustworthy)), 0)},
+       {"unit", fmt::format(" of {} runs", number(static_cast<double>(input.records.size()), 0))},
+       {"note", share(RunOutcome::kTrustworthy)}},
+      {{"name", "Do not use"},
+       {"value", number(static_cast<double>(summary.count(RunOutcome::kDoNotUse)), 0)},
+       {"unit", " runs"},
+       {"note", share(RunOutcome::kDoNotUse) + (are_filters ? ", whose filter began anew or used too few of the fixes"
+                                                            : ", as the calibrations say themselves")}},
+      {{"name", "Failed"},
+       {"value", number(static_cast<double>(summary.count(RunOutcome::kFailed)), 0)},
+       {"unit", " runs"},
+       {"note", share(RunOutcome::kFailed) + ", in no statistic"}},
+      consistency_number("NEES of the parameters", summary.nees, 1),
+      consistency_number("NIS of the fixes", summary.nis, 3)};
   if (are_filters) {
     rows.push_back(quantile_of_trustworthy("attitude_rms", 0.95));
   } else {

@@ -223,8 +223,8 @@ TEST(FieldOrError, IsDriftWhereTheAngleShowsIt) {
 }
 
 TEST(OrbitalError, IsNotTakenForDriftWhoseSpectrumWasFoundBesideIt) {
-  Scenario scenario;  // with drift outside eq. (1)
-  scenario.seed = 1616976969;
+  Scenario scenario;           // with drift outside eq. (1)
+  scenario.seed = 1616976969;  // of which the error, free while the spectrum is found, has ln B 7.7
   scenario.attitude.slews = std::vector<Slew>{};
   const sim::SimulatedPass simulated = sim::simulate(scenario);
   const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
@@ -234,7 +234,7 @@ TEST(OrbitalError, IsNotTakenForDriftWhoseSpectrumWasFoundBesideIt) {
   EXPECT_LT(evidence->log_bayes_factor, 3);
   EXPECT_TRUE(evidence->open_sigma.has_value());
   const ErrorStatistics off = statistics(attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c));
-  EXPECT_LT(off.normalised_square.value(), 1.5);
+  EXPECT_LT(off.normalised_square.value(), 1.5);  // 10 with the error
 }
 
 /// Turns about its vertical so that its panels follow the Sun, 25° out of the plane of the orbit.
