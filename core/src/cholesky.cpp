@@ -2,26 +2,9 @@
 
 #include <cmath>
 
-#include "trihedron/core/square_root_information.hpp"
+#include "trihedron/core/square_root_covariance.hpp"
 
 namespace trihedron {
-namespace {
-
-/// In place: the upper triangle of `root` becomes that of its inverse, column by column from the right, upwards.
-void invert_upper(RowsView root) {
-  for (int j = root.rows - 1; j >= 0; --j) {
-    root(j, j) = 1 / root(j, j);
-    for (int i = j - 1; i >= 0; --i) {
-      double sum = 0;
-      for (int k = i + 1; k <= j; ++k) {
-        sum += root(i, k) * root(k, j);
-      }
-      root(i, j) = -sum / root(i, i);
-    }
-  }
-}
-
-}  // namespace
 
 bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
   const Eigen::Index n = a.rows();
@@ -81,8 +64,8 @@ void solve_lower(const MatrixView& L, RowsView b) {
   }
 }
 
-bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root) {
-  // Scaled to unit diagonal first: the states differ by 1e6 in size. Then covariance = U Uᵀ, from the last row up, …
+bool covariance_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root) {
+  // Scaled to unit diagonal, since the states differ by 1e6 in size; then from the last row up.
   const int n = root.rows;
   if (covariance.rows() != n || covariance.cols() != n) {
     return false;
@@ -110,10 +93,10 @@ bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsV
       }
     }
   }
-  invert_upper(root);  // … and the root is its inverse
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i <= j; ++i) {
-      root(i, j) /= std::sqrt(covariance(j, j));
+  for (int i = 0; i < n; ++i) {
+    const double sigma = std::sqrt(covariance(i, i));
+    for (int j = i; j < n; ++j) {
+      root(i, j) *= sigma;
     }
   }
   return true;

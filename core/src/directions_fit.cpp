@@ -50,7 +50,11 @@ void DirectionsFit::add(Time t, const Directions& h_b, double beside) {
   }
   const double x = to_seconds(t - t_) / reach_s_;
   const Eigen::Vector4d powers(1, terms_ > 1 ? x : 0, terms_ > 2 ? x * x : 0, terms_ > 3 ? x * x * x : 0);
-  normal_ += powers * powers.transpose();
+  for (int j = 0; j < kTerms; ++j) {
+    for (int i = j; i < kTerms; ++i) {
+      normal_(i, j) += powers(i) * powers(j);  // of the lower triangle, which is all that the factor is made of
+    }
+  }
   for (int k = 0; k < gyros_; ++k) {
     // Differences from the first sample: the sums keep their digits.
     const Eigen::Vector3d apart = h_b[k] - first_[k];

@@ -24,7 +24,7 @@ void Forecast<Estimator>::extend(OnBoard<Estimator>& on_board, const Eigen::Matr
 
 template <class Estimator>
 void Forecast<Estimator>::predict(const Estimator& estimator, const GyroMask& used) {
-  if (!(flown_.duration_s > 0) || !estimator.information().regular()) {
+  if (!(flown_.duration_s > 0) || !estimator.errors().regular()) {
     return;
   }
   const auto place = static_cast<std::size_t>(next_);
@@ -50,8 +50,8 @@ void Forecast<Estimator>::predict(const Estimator& estimator, const GyroMask& us
   Rows3 g = a;
   carry_back(layout, flown_.sensitivities, g);
   g -= a;
-  estimator.information().see_through_uncertainty(rows_of(a));
-  estimator.information().see_through_uncertainty(rows_of(g));
+  estimator.errors().see_through_uncertainty(rows_of(a));
+  estimator.errors().see_through_uncertainty(rows_of(g));
   const CalibrationSetup& setup = estimator.setup();
   const Eigen::Matrix3d now =
       with_covariance(attitude.value(), gram<Estimator::kMaxStates>(a), setup.readout_noise_rad, layout.gyros, 0)

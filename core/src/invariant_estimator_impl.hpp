@@ -1,10 +1,8 @@
 #pragma once
 /// Definitions of InvariantEstimator.
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "trihedron/core/cholesky.hpp"
 #include "trihedron/core/elementary.hpp"
@@ -25,24 +23,25 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   if (!means_are_usable(prior, layout)) {
     return SetupFault::kPriorMeanNotUsable;
   }
-  Information information;
-  information.reset(layout.size(), layout.dynamic());
-  const int first = layout.drift(0);
-  const RowsView R = information.root();
+  const int behind = layout.direction(layout.gyros);
+  const int size = layout.size() - behind;
+  std::array<double, static_cast<std::size_t>(kMaxStatesOfPrior) * kMaxStatesOfPrior> room{};
+  const RowsView S{room.data(), size, size, size};
+  for (int i = 0; i < layout.dynamic() - behind; ++i) {
+    S(i, i) = setup.wandering_drift.sigma;
+  }
+  const int first = layout.drift(0) - behind;
   const int together = covariance.rows() == layout.drift_parameters() ? layout.drift_parameters() : layout.parameters();
-  if (!information_root(covariance, {&R(first, first), together, together, R.stride})) {
+  if (!covariance_root(covariance, {&S(first, first), together, together, size})) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
-  for (int i = layout.direction(layout.gyros); i < layout.dynamic(); ++i) {
-    R(i, i) = 1 / setup.wandering_drift.sigma;
-  }
-  for (int i = first + together; i < layout.size(); ++i) {
-    R(i, i) = 1 / prior_sigma_of_further_state(setup, i);
+  for (int i = first + together; i < size; ++i) {
+    S(i, i) = prior_sigma_of_further_state(setup, behind + i);
   }
   setup_ = setup;
   drift_ = DriftModel(layout.drift_model, layout.further);
   prior_gyros_ = prior;
-  prior_.pack(std::as_const(information).root());
+  prior_.pack(S);
   forget();
   return std::nullopt;
 }
@@ -51,7 +50,7 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::forget() {
   gyros_ = prior_gyros_;
   shared_ = Shared::Zero(layout().shared_size());
-  information_.reset(layout().size(), layout().dynamic());
+  errors_.reset(layout().size());
   gate_ = {};
   correlation_ = {};
   begin_stretch();
@@ -63,7 +62,7 @@ void InvariantEstimator<kCapacity>::forget() {
 
 template <Capacity kCapacity>
 bool InvariantEstimator<kCapacity>::sound() const {
-  return information_.regular() && shared_.allFinite() && estimates_are_finite(gyros_, layout());
+  return errors_.regular() && shared_.allFinite() && estimates_are_finite(gyros_, layout());
 }
 
 template <Capacity kCapacity>
@@ -74,21 +73,19 @@ double InvariantEstimator<kCapacity>::fixes_sharing_samples_of(const StarFix& fi
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::begin_stretch() {
-  for (int k = 0; k < layout().gyros; ++k) {
-    since_fix_[k].begin(layout().drift_columns());
-  }
+  since_fix_.begin(layout().drift_columns());
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::prior_error_root(RowsView root) const {
-  prior_.invert(layout().direction(layout().gyros), root);
+  prior_.unpack(root);
 }
 
 template <Capacity kCapacity>
 Eigen::Matrix3d InvariantEstimator<kCapacity>::covariance_of(Rows3 by_states) const {
-  information_.see_through_uncertainty(rows_of(by_states));
+  errors_.see_through_uncertainty(rows_of(by_states));
   return gram<kMaxStates>(by_states);
 }
 
@@ -135,7 +132,7 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
     if (to_be_worked_out && time_since_fix_s_ > 0) {
       const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
       const Eigen::Matrix3d drift = covariance_from(
-          layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
+          layout.drift(k), since_fix_.all()[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
       second_order_.prediction_rad_s[k] = second_order_rad(alignment, drift) / time_since_fix_s_;
     }
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance, and a random walk
@@ -153,46 +150,38 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gyros>& noise_rad) {
   const Layout& layout = setup_.layout;
   const int d = layout.dynamic();
-  const int columns = layout.drift_columns();
-  typename Information::DynamicMatrix A_inverse = Information::DynamicMatrix::Zero(d, d);
-  typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero(d, layout.constants());
-  typename Information::DynamicVector noise = Information::DynamicVector::Zero(d);
+  typename Errors::DynamicByStates F = Errors::DynamicByStates::Zero(d, layout.size());
+  typename Errors::DynamicVector noise = Errors::DynamicVector::Zero(d);
   const double kept = setup_.wandering_drift.kept(time_since_fix_s_);
   for (int k = 0; k < layout.gyros; ++k) {
-    const auto& since = since_fix_[k];
-    const auto by_drift = since.by_drift.first(columns);
+    const auto& since = since_fix_.all()[k];
+    const auto by_drift = since.by_drift.first(layout.drift_columns());
     const int row = layout.direction(k);
-    const Eigen::Matrix3d to_start = since.by_start.inverse();
-    A_inverse.template block<3, 3>(row, row) = to_start;
-    B.block(row, layout.drift(k) - d, 3, layout.drift_size()) = by_drift.leftCols(layout.drift_size());
-    B.template block<3, 3>(row, layout.alignment(k) - d) = since.by_alignment;
-    for (const Layout::Block& its : layout.beside_kappa(k)) {
-      if (its.size > 0) {
-        B.block(row, its.state - d, 3, its.size) = by_drift.middleCols(its.column, its.size);
-      }
-    }
+    auto by_states = F.template middleRows<3>(row);
+    by_states.template middleCols<3>(row) = since.by_start;
+    by_states.template middleCols<3>(layout.alignment(k)) = since.by_alignment;
+    put_drift_columns(layout, k, by_drift, by_states);
     noise.template segment<3>(row).setConstant(noise_rad[k]);
     if (layout.further.wandering_drift) {
       const int wandering = layout.wandering(k);
-      A_inverse.template block<3, 3>(row, wandering) =
-          to_start * by_drift.template middleCols<3>(layout.wandering_column()) * (-1 / kept);
-      A_inverse.template block<3, 3>(wandering, wandering) = 1 / kept * Eigen::Matrix3d::Identity();
+      F.template block<3, 3>(wandering, wandering).diagonal().setConstant(kept);
       noise.template segment<3>(wandering).setConstant(setup_.wandering_drift.noise(kept));
       gyros_[k].drift_rad_s.template segment<3>(layout.wandering_column()) *= kept;
     }
   }
-  information_.propagate(A_inverse, B, noise);
+  errors_.propagate(rows_of(F), noise);
   begin_stretch();
 }
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::follow_alignments(const FixReadings& readings) {
+  since_fix_.settle();
   for (int k = 0; k < layout().gyros; ++k) {
     if (!readings.used[k]) {
       continue;
     }
     const Gyro& gyro = gyros_[k];
-    auto& since = since_fix_[k];
+    auto& since = since_fix_.all()[k];
     auto by_drift = since.by_drift.first(layout().drift_columns());
     for (int i = 0; i < by_drift.cols(); ++i) {
       const double along = gyro.h_in.dot(by_drift.col(i));
@@ -215,9 +204,9 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
   constexpr int kMaxRows = 3 * kCapacity.gyros;
   const Layout& layout = setup_.layout;
   const int rows = 3 * layout.gyros;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxRows, kMaxStates> H(rows, layout.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxRows, kMaxStates> F(rows, layout.size());
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows> R(rows, rows);
-  H.setZero();
+  F.setZero();
   const Eigen::Matrix3d R_in = C_in_c * its.R_c * C_in_c.transpose();
   for (int k = 0; k < layout.gyros; ++k) {
     const int row = 3 * k;
@@ -225,25 +214,24 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
       gyros_[k].h_in = (C_in_c * gyros_[k].in_c(readings.h_b[k])).normalized();
     }
     h_b_at_fix_[k] = gyros_[k].reading_of(C_in_c.transpose() * gyros_[k].h_in).template cast<float>();
-    H.template block<3, 3>(row, layout.direction(k)).setIdentity();
-    H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
-    H.block(row, layout.readout(k), 3, layout.readout_size()) =
-        by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])), gyros_[k], readings.h_b[k]);
-    H.block(row, layout.shared(), 3, layout.shared_size()) = C_in_c.lazyProduct(its.by_shared);
+    F.template block<3, 3>(row, layout.alignment(k)) = C_in_c;
+    F.block(row, layout.readout(k), 3, layout.readout_size()) =
+        by_readout_errors(layout, -C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])), gyros_[k], readings.h_b[k]);
+    F.block(row, layout.shared(), 3, layout.shared_size()) = -C_in_c.lazyProduct(its.by_shared);
     for (int j = 0; j < layout.gyros; ++j) {
       R.template block<3, 3>(row, 3 * j) = R_in;
     }
     const double sigma = readings.used[k] ? setup_.readout_noise_rad[k] * readings.noise_factor : kUnknown_rad;
     R.template block<3, 3>(row, row).diagonal().array() += sigma * sigma;
   }
-  information_.reset(layout.size(), layout.dynamic());
+  errors_.reset(layout.size());
+  const RowsView S = errors_.root();
+  const int behind = layout.direction(layout.gyros);
+  prior_.unpack({&S(behind, behind), layout.size() - behind, layout.size() - behind, S.stride});
+  errors_.begin(rows_of(F), R);
   correlation_ = {};
-  prior_.unpack(information_.root());
   std::ranges::fill(second_order_rad_, 0.0);
   second_order_ = {};
-  static_cast<void>(factorize(R));
-  solve_lower(matrix_of(R), rows_of(H));
-  information_.add_information(rows_of(H));
   begin_stretch();
   angles_since_fix_ = 0;
 }
@@ -259,21 +247,14 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
     moved.template segment<3>(layout.alignment(k)) =
         Rot<C, C>::assume(Eigen::Matrix3d(gyros_[k].C_c_b * before.C_c_b.transpose())).log().raw();
   }
-  double square = 0;
-  for (int i = 0; i < layout.size(); ++i) {
-    double sum = 0;
-    for (int j = i; j < layout.size(); ++j) {
-      sum += prior_(i, j) * moved(j);
-    }
-    square += sum * sum;
-  }
-  return square <= gate_of_freedom(layout.parameters(), setup_.gate_nis);
+  prior_.solve(&moved(layout.direction(layout.gyros)));
+  return moved.squaredNorm() <= gate_of_freedom(layout.parameters(), setup_.gate_nis);
 }
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
   const auto times = [&] { return setup_.drift_times(t - from_seconds(dt_s / 2)); };
-  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, times, dt_s);
+  since_fix_.precess_all(gyros_, layout().gyros, drift_, C_in_c, h_b, times, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }
@@ -374,20 +355,14 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fi
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
-  const int components = static_cast<int>(white.rows.rows());
-  Compared through = white.rows;
-  information_.see_through_uncertainty({through.data(), components, layout().size(), layout().size() + 1});
-  const auto H = through.leftCols(layout().size());
+  const int components = static_cast<int>(white.seen.rows());
+  const RowsView H = states_of(white.seen);
+  errors_.see_through_uncertainty(H);
   white.covariance = ComponentCovariance::Identity(components, components);
-  for (int i = 0; i < components; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      white.covariance(i, j) += H.row(i).dot(H.row(j));
-      white.covariance(j, i) = white.covariance(i, j);
-    }
-  }
+  add_square({H.data, H.rows, H.columns, H.stride}, white.covariance.data(), white.covariance.outerStride());
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
-  white.y = white.rows.col(layout().size());
+  white.y = white.seen.col(layout().size());
   solve_lower(matrix_of(root), white.y);
   white.nis = white.y.squaredNorm();
 }
@@ -396,9 +371,9 @@ template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                              const PerGyro<double>& noise_rad) const -> White {
   White white;
-  white.rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
+  white.seen = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   white.L = noise_of(comparison, R_c, noise_rad);
-  whiten(white.L, rows_of(white.rows));
+  whiten(white.L, rows_of(white.seen));
   put_innovation(white);
   return white;
 }
@@ -440,7 +415,7 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
   }
   triangularise(rows_of(rows), 3);
   White white;
-  white.rows = rows.bottomRightCorner(components - 3, columns);
+  white.seen = rows.bottomRightCorner(components - 3, columns);
   put_innovation(white);
   return white;
 }
@@ -563,8 +538,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
                                              const Directions& h_b, FixReport& report) {
   constexpr double kPartOfMisfit = 0.2;  // less may be what the model leaves out
   report.nis = white.nis;
-  const ComponentCovariance left = white.L.lazyProduct(white.covariance);
-  detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
+  detail::report_innovation(layout(), comparison, before_whitening(white.L, white.covariance), report);
   detail::report_angles(layout(), gyros_, comparison, h_b, report);
 
   const bool is_of_gyros = report.gyros_contradict() && report.angle_off_rad > kPartOfMisfit * misfit_rad;
@@ -578,7 +552,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 12> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 350, 160, 30, 0};
+  constexpr std::array<int, 12> kCosts = {25, 75, 70, 65, 65, 105, 300, 150, 450, 140, 25, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 
@@ -599,6 +573,7 @@ int InvariantEstimator<kCapacity>::cost_to_end(const Correction& correction) {
 template <Capacity kCapacity>
 FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
   Correction correction;
+  correction.at_once = true;
   FixReport report;
   for (int i = 0; i < kMostStages && !correction.done(); ++i) {
     carry_on(correction, fix, readings, report);
@@ -680,7 +655,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       correction.stage = Stage::kJudgement;
       break;
     case Stage::kJudgement:
-      judge(correction, seen(fix, readings), readings, report);
+      judge(correction, seen(fix, readings), fix, readings, report);
       break;
     case Stage::kFault:
       look_for_fault(correction, seen(fix, readings), readings, report);
@@ -727,12 +702,12 @@ void InvariantEstimator<kCapacity>::begin(Correction& correction, const StarFix&
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& its, const FixReadings& readings,
-                                          FixReport& report) {
+void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& its, const StarFix& fix,
+                                          const FixReadings& readings, FixReport& report) {
   using Stage = typename Correction::Stage;
   const FixComparison comparison = compared(its, correction, readings);
   const double misfit_rad = detail::misfit_rad(comparison);
-  const White white = whitened(comparison, its.R_c, correction.reading_noise_rad);
+  White white = whitened(comparison, its.R_c, correction.reading_noise_rad);
   ask_gate(comparison, white, misfit_rad, readings.h_b, report);
   correction.stage = Stage::kUpdate;
   if (report.status != FixStatus::kUsed) {
@@ -760,6 +735,9 @@ void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& it
       look_for_correlation(correction, white, report);
       break;
   }
+  if (correction.stage == Stage::kUpdate && correction.at_once && !(fixes_sharing_samples_of(fix) > 1)) {
+    use(correction, fix, white.seen, report.weight);  // the rows of the update are those that were judged
+  }
 }
 
 template <Capacity kCapacity>
@@ -778,22 +756,7 @@ void InvariantEstimator<kCapacity>::look_for_correlation(Correction& correction,
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::widen() {
-  const int size = layout().size();
-  const RowsView R = information_.root();
-  for (int i = 0; i < size; ++i) {
-    for (int j = i; j < size; ++j) {
-      R(i, j) /= kWidening;
-    }
-  }
-  const double rest = std::sqrt(1 - 1 / (kWidening * kWidening));
-  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kMaxStates> row(1, size);
-  for (int i = layout().dynamic(); i < size; ++i) {
-    row.setZero();
-    for (int j = i; j < size; ++j) {
-      row(0, j) = rest * prior_(i, j);
-    }
-    information_.add_information(rows_of(row));
-  }
+  errors_.widen(kWidening, prior_, layout().direction(layout().gyros), layout().dynamic());
 }
 
 template <Capacity kCapacity>
@@ -817,13 +780,20 @@ void InvariantEstimator<kCapacity>::look_for_fault(Correction& correction, const
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::update(Correction& correction, const Seen& its, const StarFix& fix,
                                            const FixReadings& readings, const FixReport& report) {
-  angles_since_fix_ = 0;
-  const double sharing = fixes_sharing_samples_of(fix);
-  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
   Compared rows = rows_to_use(compared(its, correction, readings), its.R_c, correction.reading_noise_rad,
-                              readings.noise_factor, sharing);
-  rows *= std::sqrt(report.weight);
-  information_.take(rows_of(rows));
+                              readings.noise_factor, fixes_sharing_samples_of(fix));
+  errors_.see_through_uncertainty(states_of(rows));
+  use(correction, fix, rows, report.weight);
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::use(Correction& correction, const StarFix& fix, Compared& seen, double weight) {
+  angles_since_fix_ = 0;
+  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
+  if (weight < 1) {
+    seen *= std::sqrt(weight);
+  }
+  errors_.take(rows_of(seen));
   correction.stage = Correction::Stage::kFeedback;
 }
 
@@ -887,13 +857,13 @@ void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const F
   }
   report.status = FixStatus::kUsed;
   angle_rejections_in_a_row_ = 0;
-  information_.take(rows_of(white.rows));
+  errors_.take(rows_of(white.seen));
   feed_back();
 }
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::feed_back() {
-  const Vector x = information_.correction();
+  const Vector x = errors_.correction();
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];

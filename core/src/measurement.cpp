@@ -66,6 +66,29 @@ void whiten(ComponentCovariance& R, RowsView rows) {
   solve_lower(matrix_of(R), rows);
 }
 
+ComponentCovariance before_whitening(const ComponentCovariance& L, const ComponentCovariance& covariance) {
+  const Eigen::Index n = L.rows();
+  ComponentCovariance left(n, n);
+  ComponentCovariance all(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      double sum = 0;
+      for (Eigen::Index k = 0; k <= i; ++k) {
+        sum += L(i, k) * covariance(k, j);
+      }
+      left(i, j) = sum;
+    }
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      double sum = 0;
+      for (Eigen::Index k = 0; k <= j; ++k) {
+        sum += left(i, k) * L(j, k);
+      }
+      all(i, j) = all(j, i) = sum;
+    }
+  }
+  return all;
+}
+
 AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,
                                  const PerGyro<double>& readout_noise_rad, int gyros, double walk_variance_rad2) {
   AttitudeSolution solution;

@@ -444,6 +444,7 @@ template <class Estimator>
 void OnBoard<Estimator>::prepare(Time t, const FittedReadings& readings, typename Work::Stage stage) {
   follow(t, readings.h_b);
   work_ = {};
+  work_.correction.at_once = !spreads();
   work_.stage = stage;
   work_.t = t;
   jitter_.add(t, reach(), readings.unfollowed);

@@ -1,6 +1,6 @@
 #include "trihedron/core/paper_estimator.hpp"
 
-#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "trihedron/core/cholesky.hpp"
@@ -20,25 +20,25 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
   }
   constexpr int kFirst = States::kDynamic;
   constexpr int kParameters = States::kSize - kFirst;
-  Information information;
-  information.reset(States::kSize, kFirst);
-  const RowsView R = information.root();
-  if (!information_root(covariance, {&R(kFirst, kFirst), kParameters, kParameters, R.stride})) {
+  Errors errors;
+  errors.reset(States::kSize);
+  const RowsView S = errors.root();
+  if (!covariance_root(covariance, {&S(kFirst, kFirst), kParameters, kParameters, S.stride})) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   setup_ = setup;
   drift_ = DriftModel(setup.layout.drift_model, setup.layout.further);
   prior_gyros_ = prior;
-  prior_ = information;
+  prior_ = errors;
   forget();
   return std::nullopt;
 }
 
 void PaperEstimator::forget() {
   gyros_ = prior_gyros_;
-  information_ = prior_;
+  errors_ = prior_;
   gate_ = {};
-  since_fix_ = {};
+  since_fix_.begin(Esg7::kSize);
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
   started_ = false;
@@ -72,36 +72,34 @@ auto PaperEstimator::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
 }
 
 void PaperEstimator::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time /*t*/, double dt_s) {
-  precess_all(
-      gyros_, since_fix_, kGyros, drift_, C_in_c, h_b, [] { return DriftTimes{}; }, dt_s);
+  since_fix_.precess_all(
+      gyros_, kGyros, drift_, C_in_c, h_b, [] { return DriftTimes{}; }, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }
 
 void PaperEstimator::update_covariance_to_now(const QuasiInertial& now) {
   // Δh = φ × h carries the sensitivities, which are in φ, to the paper's components.
-  Eigen::Matrix4d by_start = Eigen::Matrix4d::Zero();
-  Information::DynamicByConstants by_parameters =
-      Information::DynamicByConstants::Zero(States::kDynamic, States::kSize - States::kDynamic);
+  Errors::DynamicByStates F = Errors::DynamicByStates::Zero(States::kDynamic, States::kSize);
+  since_fix_.settle();
+  const Sensitivities& since = since_fix_.all();
   for (int k = 0; k < kGyros; ++k) {
     const Eigen::Matrix3d cross_h = skew<double>(gyros_[k].h_in);
     const Eigen::Matrix<double, 2, 3> components_of_phi = -now.components[k] * cross_h;
-    const Eigen::Vector3d h_before = since_fix_[k].by_start.transpose() * gyros_[k].h_in;
+    const Eigen::Vector3d h_before = since[k].by_start.transpose() * gyros_[k].h_in;
     const int row = States::direction(k);
-    by_start.block<2, 2>(row, row) =
-        components_of_phi * since_fix_[k].by_start * skew<double>(h_before) * qi_.tangents[k];
-    by_parameters.block<2, Esg7::kSize>(row, States::drift(k) - States::kDynamic) =
-        components_of_phi.lazyProduct(since_fix_[k].by_drift.first(Esg7::kSize));
-    by_parameters.block<2, 3>(row, States::alignment(k) - States::kDynamic) =
-        components_of_phi * since_fix_[k].by_alignment;
+    F.block<2, 2>(row, row) = components_of_phi * since[k].by_start * skew<double>(h_before) * qi_.tangents[k];
+    F.block<2, Esg7::kSize>(row, States::drift(k)) =
+        components_of_phi.lazyProduct(since[k].by_drift.first(Esg7::kSize));
+    F.block<2, 3>(row, States::alignment(k)) = components_of_phi * since[k].by_alignment;
   }
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
   const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
   // Component 2 of gyro 2 sees sinθ of an isotropic error across h2.
   const Eigen::Vector4d noise(sigma, sigma, sigma, sigma * now.sine);
-  information_.propagate(by_start.inverse(), by_parameters, noise);
+  errors_.propagate(rows_of(F), noise);
   qi_ = now;
-  since_fix_ = {};
+  since_fix_.begin(Esg7::kSize);
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }
@@ -131,17 +129,15 @@ auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const 
   return measurement;
 }
 
-void PaperEstimator::report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows,
-                                       const Eigen::Matrix4d& L, FixReport& report) const {
-  ComparedRows<kMaxStates> through = rows;
-  information_.see_through_uncertainty({through.data(), kMeasurements, kMaxStates, kMaxStates + 1});
-  const Eigen::Matrix<double, kMeasurements, kMaxStates> H = through.leftCols<kMaxStates>();
-  const Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity() + H.lazyProduct(H.transpose());
-  Eigen::Vector4d normalized = rows.col(kMaxStates);
+void PaperEstimator::report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& seen,
+                                       const ComponentCovariance& L, FixReport& report) {
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();
+  add_square({seen.data(), kMeasurements, kMaxStates, kMaxStates + 1}, covariance.data(), kMeasurements);
+  Eigen::Vector4d normalized = seen.col(kMaxStates);
   solve_lower(matrix_of(cholesky_root<kMeasurements>(covariance)), normalized);
   report.nis = normalized.squaredNorm();
   report.innovation = measurement.innovation;
-  report.innovation_covariance = L * covariance * L.transpose();
+  report.innovation_covariance = before_whitening(L, covariance);
 }
 
 FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& readings) {
@@ -175,18 +171,18 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
     qi_ = now;
   }
   const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_, fix.covariance);
+  if (!started_) {
+    start(measurement);
+    started_ = true;
+    report.status = FixStatus::kStarted;
+    return report;
+  }
   ComparedRows<kMaxStates> rows(kMeasurements, kMaxStates + 1);
   rows << measurement.H, measurement.innovation;
   ComponentCovariance L = measurement.R;
   whiten(L, rows_of(rows));
 
-  if (!started_) {
-    information_.add_information({rows.data(), kMeasurements, kMaxStates, kMaxStates + 1});
-    started_ = true;
-    report.status = FixStatus::kStarted;
-    return report;
-  }
-
+  errors_.see_through_uncertainty(states_of(rows));
   report_innovation(measurement, rows, L, report);
   report.status = gate_.judge(setup_, report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
@@ -201,23 +197,37 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
       break;
     case FixStatus::kRestarted:
       // The information was gathered about estimates that are far off: linearise again about the present ones.
-      information_ = prior_;
+      errors_ = prior_;
+      start(measurement);
       report.weight = 1;
-      break;
+      return report;
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
       update_covariance_to_now(now);
+      rows.leftCols<kMaxStates>() = measurement.H;
+      solve_lower(matrix_of(L), states_of(rows));
+      errors_.see_through_uncertainty(states_of(rows));
       report.weight = 1;
       break;
     default:
       break;
   }
   rows *= std::sqrt(report.weight);
-  feed_back(information_.update(rows_of(rows)));
+  errors_.take(rows_of(rows));
+  feed_back(errors_.correction());
   return report;
 }
 
-void PaperEstimator::feed_back(const Information::Vector& correction) {
+void PaperEstimator::start(const Measurement& measurement) {
+  Errors::DynamicByStates F = -measurement.H;
+  F.leftCols<States::kDynamic>().setZero();
+  errors_.begin(rows_of(F), measurement.R);
+  Errors::Vector correction = Errors::Vector::Zero(kMaxStates);
+  correction.head<States::kDynamic>() = measurement.innovation;
+  feed_back(correction);
+}
+
+void PaperEstimator::feed_back(const Errors::Vector& correction) {
   for (int k = 0; k < kGyros; ++k) {
     Gyro& gyro = gyros_[k];
     const Eigen::Vector3d direction_error = qi_.tangents[k] * correction.segment<2>(States::direction(k));
@@ -229,15 +239,15 @@ void PaperEstimator::feed_back(const Information::Vector& correction) {
 }
 
 void PaperEstimator::error_root(RowsView root) const {
-  Eigen::Matrix<double, kMaxStates, kMaxStates, Eigen::RowMajor> inverse;
-  information_.inverse_root(rows_of(inverse));
+  Eigen::Matrix<double, kMaxStates, kMaxStates, Eigen::RowMajor> S;
+  errors_.put_root(rows_of(S));
   const Layout errors = error_layout();
   Eigen::Matrix<double, kMaxErrors, kMaxStates, Eigen::RowMajor> rows;
   for (int k = 0; k < kGyros; ++k) {
     rows.middleRows<3>(errors.direction(k)) =
-        skew<double>(gyros_[k].h_in) * qi_.tangents[k] * inverse.middleRows<2>(States::direction(k));
+        skew<double>(gyros_[k].h_in) * qi_.tangents[k] * S.middleRows<2>(States::direction(k));
   }
-  rows.bottomRows(errors.parameters()) = inverse.bottomRows(errors.parameters());
+  rows.bottomRows(errors.parameters()) = S.bottomRows(errors.parameters());
   for (int i = 0; i < root.rows; ++i) {
     for (int j = 0; j < kMaxStates; ++j) {
       root(i, j) = rows(i, j);
@@ -246,9 +256,10 @@ void PaperEstimator::error_root(RowsView root) const {
 }
 
 void PaperEstimator::prior_error_root(RowsView root) const {
-  constexpr int kFirst = States::kDynamic;
-  const ConstRowsView R = prior_.root();
-  invert_triangle({&R(kFirst, kFirst), kMaxStates - kFirst, kMaxStates - kFirst, R.stride}, root);
+  const ConstRowsView S = prior_.root();
+  for (int i = 0; i < root.rows; ++i) {
+    std::copy_n(&S(States::kDynamic + i, States::kDynamic), root.columns, root.row(i));
+  }
 }
 
 Eigen::Matrix3d PaperEstimator::covariance_of_errors(const Rows3& by_errors) const {
@@ -259,7 +270,7 @@ Eigen::Matrix3d PaperEstimator::covariance_of_errors(const Rows3& by_errors) con
         by_errors.middleCols<3>(errors.direction(k)) * skew<double>(gyros_[k].h_in) * qi_.tangents[k];
   }
   rows.rightCols(errors.parameters()) = by_errors.rightCols(errors.parameters());
-  information_.see_through_uncertainty(rows_of(rows));
+  errors_.see_through_uncertainty(rows_of(rows));
   return gram<kMaxStates>(rows);
 }
 

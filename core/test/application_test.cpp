@@ -478,7 +478,7 @@ TEST(Hold, WhileTheCorrectionOfAnAdoptionIsUnderWayGivesItUp) {
   int given_up = 0;
   int done = 0;
   for (int samples = 0; samples < 48; ++samples) {
-    const double commanded_s = 606 + samples / 8.0;
+    const double commanded_s = 605.25 + samples / 8.0;
     PairApplication application = begun;
     fly_from(flight(), 600, 605, application);
     EXPECT_EQ(application.command(Command::kAdoptCalibration), Answer::kAccepted);
@@ -537,15 +537,15 @@ TEST(Adoption, IsTakenBackWhenResidualsDisagree) {
 }
 
 /// A soft error in the memory of the estimate: no longer a covariance.
-void spoil_information(PairApplication& application) {
-  const_cast<double&>(application.on_board().estimator().information().root()(25, 25)) = kNaN;
+void spoil_covariance(PairApplication& application) {
+  const_cast<double&>(application.on_board().estimator().errors().root()(25, 25)) = kNaN;
 }
 
 TEST(Adoption, ThatIsStillToComeIsDroppedWhenTheEstimateIsLost) {
   PairApplication application = application_in(kCalibrating);
   fly_from(flight(), 300, 600, application);
   EXPECT_EQ(application.command(Command::kAdoptCalibration), Answer::kAccepted);
-  spoil_information(application);
+  spoil_covariance(application);
   fly_from(flight(), 600, 620, application);
   const Housekeeping record = application.housekeeping();
   EXPECT_EQ(record.filter_restarts, 1U);
@@ -1183,7 +1183,7 @@ TEST(FilterRestarted, BeginsToAlignAgain) {
 
 TEST(FilterRestarted, AlsoWhereTheEstimateIsLost) {
   PairApplication application = application_in(kCalibrating);
-  spoil_information(application);
+  spoil_covariance(application);
   bool lost = false;
   fly_from(flight(), 300, 360, application, [&](const StepReport& report) {
     if (report.fix.status == FixStatus::kEstimateLost) {
@@ -1198,7 +1198,7 @@ TEST(FilterRestarted, AlsoWhereTheEstimateIsLost) {
 TEST(FilterRestarted, AlsoWhereTheEstimateIsLostWithoutAStarTracker) {
   PairApplication application = application_in(kCalibrating);
   fly_from(flight().samples, kNoFixes, 300, 350, application);
-  spoil_information(application);
+  spoil_covariance(application);
   bool lost = false;
   fly_from(flight().samples, kNoFixes, 350, 400, application, [&](const StepReport& report) {
     if (report.angles.status == FixStatus::kEstimateLost) {

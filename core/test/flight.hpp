@@ -177,20 +177,14 @@ Eigen::MatrixXd error_root(const Estimator& estimator) {
 template <class Estimator>
 Eigen::MatrixXd state_root(const Estimator& estimator) {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(estimator.states(), estimator.states());
-  estimator.information().inverse_root(rows_of(root));
+  estimator.errors().put_root(rows_of(root));
   return root;
 }
 
-/// |R v|²: the information about the states along v.
+/// vᵀ P⁻¹ v: the information about the states along v.
 template <class Estimator>
 double information_along(const Estimator& estimator, const Eigen::VectorXd& v) {
-  const ConstRowsView R = estimator.information().root();
-  double square = 0;
-  for (int i = 0; i < R.rows; ++i) {
-    const double sum = Eigen::Map<const Eigen::VectorXd>(R.row(i), R.columns).dot(v);
-    square += sum * sum;
-  }
-  return square;
+  return state_root(estimator).template triangularView<Eigen::Upper>().solve(v).squaredNorm();
 }
 
 /// Errors of the parameters of a pair with eq. (1), truth − estimate, in the order of the layout.

@@ -167,7 +167,7 @@ void expect_same_bits(const Matrix& a, const Matrix& b) {
 }
 
 /// A reading that turns, bias and alignment, and a drift by which a momentum turns by up to half a radian in a step.
-TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
+TEST(PrecessTwo, GivesTheBitsOfEachGyroAlone) {
   constexpr int kCount = 3;  // two side by side, and one alone
   for (const double times : {1.0, 5e3}) {
     PerGyro<Gyro> together;
@@ -197,7 +197,9 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
         h_b[k] = C_in_c.transpose() * together[k].h_in;
       }
       const double dt_s = i % 2 == 0 ? 0.125 : 0.1;
-      precess_all(together, since, kCount, kEq1, C_in_c, h_b, no_times, dt_s * times);
+      precess_two({together[0], h_b[0]}, {together[1], h_b[1]}, SensitivityOfEq1(since[0]), SensitivityOfEq1(since[1]),
+                  C_in_c, dt_s * times);
+      precess(together[2], since[2], kEq1, C_in_c, h_b[2], {}, dt_s * times);
       precess_all(navigated, kCount, kEq1, C_in_c, h_b, no_times, dt_s * times);
       Eigen::Vector3d rates[2];
       for (int k = 0; k < 2; ++k) {
@@ -225,6 +227,99 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
       expect_same_bits(since_by_rates[k].by_alignment, since_alone[k].by_alignment);
       expect_same_bits(since_by_rates[k].by_drift.first(kColumns).eval(),
                        since_alone[k].by_drift.first(kColumns).eval());
+    }
+  }
+}
+
+/// Gyros as they precess on board, beside the same ones step by step.
+struct BesideStepByStep {
+  static constexpr int kCount = 3;  // two side by side, and one alone
+  PerGyro<Gyro> gyros;
+  SensitivitiesOfAll<kColumns, kMaxGyros> since;
+  PerGyro<Gyro> alone;
+  PerGyro<Sensitivities> since_alone;
+
+  explicit BesideStepByStep(double drift) {
+    for (int k = 0; k < kCount; ++k) {
+      gyros[k].h_in = Eigen::Vector3d(0.5, 0.6 - k, 0.62).normalized();
+      gyros[k].drift_rad_s << -2e-6, -4e-7, -5e-8, -1.2e-6 * k, 1.8e-6, 7e-7, -8e-7;
+      gyros[k].drift_rad_s *= drift;
+      gyros[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(2e-3, -4e-3 * k, -7e-3)).raw();
+    }
+    alone = gyros;
+    since.begin(kColumns);
+  }
+  /// A step in which the body has turned by `turned` of the usual.
+  void step(double turned, double dt_s) {
+    const Eigen::Matrix3d C_in_c = attitude_at(turned);
+    Directions h_b;
+    for (int k = 0; k < kCount; ++k) {
+      h_b[k] = C_in_c.transpose() * alone[k].h_in;
+      precess(alone[k], since_alone[k], kEq1, C_in_c, h_b[k], {}, dt_s);
+    }
+    since.precess_all(
+        gyros, kCount, kEq1, C_in_c, h_b, [] { return DriftTimes{}; }, dt_s);
+  }
+  /// How far the sensitivities are from those step by step, at most, each as a part of itself.
+  [[nodiscard]] double farthest() const {
+    const auto now = since.at_present();
+    double most = 0;
+    for (int k = 0; k < kCount; ++k) {
+      const Sensitivities& a = since_alone[k];
+      for (const double off :
+           {(now[k].by_start - a.by_start).norm() / (a.by_start - Eigen::Matrix3d::Identity()).norm(),
+            (now[k].by_alignment - a.by_alignment).norm() / a.by_alignment.norm(),
+            (now[k].by_drift.first(kColumns) - a.by_drift.first(kColumns)).norm() /
+                a.by_drift.first(kColumns).norm()}) {
+        most = off <= most ? most : off;  // also what is no number
+      }
+    }
+    return most;
+  }
+};
+
+TEST(SensitivitiesOfAll, AgreeWithThoseStepByStep) {
+  BesideStepByStep its(1);
+  for (int i = 0; i < 1000; ++i) {
+    its.step(0.05 * i, i % 3 == 0 ? 0.1 : 0.125);
+    ASSERT_LT(its.farthest(), 1e-7) << i;
+  }
+  for (int k = 0; k < BesideStepByStep::kCount; ++k) {
+    EXPECT_LT((its.gyros[k].h_in - its.alone[k].h_in).norm(), 1e-14) << k;
+  }
+}
+
+TEST(SensitivitiesOfAll, AgreeWhereTheyAreSettledAtAnyTime) {
+  BesideStepByStep its(1);
+  for (int i = 0; i < 300; ++i) {
+    its.step(0.05 * i, 0.125);
+    if (i % 7 == 0 || i % 11 == 0) {
+      its.since.settle();
+    }
+  }
+  EXPECT_LT(its.farthest(), 1e-7);
+}
+
+TEST(SensitivitiesOfAll, TakeLongStepsAndLargeDriftOneByOne) {
+  BesideStepByStep fast(5e3);
+  for (int i = 0; i < 50; ++i) {
+    fast.step(i, 1);
+  }
+  EXPECT_LT(fast.farthest(), 1e-15);
+  // An hour between short steps: what was summed before it must turn with it.
+  BesideStepByStep its(1);
+  for (int i = 0; i < 30; ++i) {
+    its.step(0.1 * i, i % 10 == 5 ? 3600 : 0.125);
+  }
+  EXPECT_LT(its.farthest(), 1e-7);
+}
+
+TEST(SensitivitiesOfAll, AreOffByHalfOfTheTurnAtMostWhereOneStepIsMuchLonger) {
+  for (const double long_s : {0.5, 1.0, 2.0, 5.0}) {
+    BesideStepByStep its(1);
+    for (int i = 0; i < 8; ++i) {
+      its.step(0.1 * i, i == 5 ? long_s : 0.125);
+      ASSERT_LT(its.farthest(), 0.5 * StepsOfTwo::kMostTurn_rad) << long_s << ' ' << i;
     }
   }
 }

@@ -30,9 +30,9 @@ const Part kParts[] = {
     {"  estimator", sizeof(Small), sizeof(Large)},
     {"    set-up", sizeof(CalibrationSetup), sizeof(CalibrationSetup)},
     {"    drift model", sizeof(DriftModel), sizeof(DriftModel)},
-    {"    root of the information", sizeof(Small::Information), sizeof(Large::Information)},
+    {"    root of the covariance", sizeof(Small::Errors), sizeof(Large::Errors)},
     {"    gyros", sizeof(Small::Gyros), sizeof(Large::Gyros)},
-    {"    sensitivities", sizeof(Small::Sensitivities), sizeof(Large::Sensitivities)},
+    {"    sensitivities", sizeof(Small::Since), sizeof(Large::Since)},
     {"  navigator", sizeof(Navigator<Small>), sizeof(Navigator<Large>)},
     {"report of a step", sizeof(StepReport), sizeof(StepReport)},
 };

@@ -91,10 +91,10 @@ void Filters::start(std::size_t i, const StarFix& fix, const Fix& all) {
 
 void Filters::load(std::size_t i, const Fix& all) {
   const Lane::Estimator& estimator = *lanes_[i]->estimator;
-  const ConstRowsView root = estimator.information().root();
+  const ConstRowsView root = estimator.errors().root();
   for (int row = 0; row < kStates; ++row) {
     for (int column = 0; column < kStates; ++column) {
-      filter_->root[row * kColumns + column][i] = root(row, column);
+      filter_->root[row * kStates + column][i] = root(row, column);
     }
   }
   filter_->time_since_fix_s[i] = 0;
@@ -230,12 +230,10 @@ std::optional<FilterResult> Filters::result(std::size_t i) const {
   Eigen::Matrix<double, kConstants, kConstants> root;
   for (int row = 0; row < kConstants; ++row) {
     for (int column = 0; column < kConstants; ++column) {
-      root(row, column) = filter_->root[(kMoving + row) * kColumns + kMoving + column][i];
+      root(row, column) = filter_->root[(kMoving + row) * kStates + kMoving + column][i];
     }
   }
-  const Eigen::MatrixXd inverse =
-      root.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(kConstants, kConstants));
-  result.covariance = inverse * inverse.transpose();
+  result.covariance = root * root.transpose();
   result.error.resize(kConstants);
   for (int k = 0; k < kGyros; ++k) {
     const sim::Gyro& truth = lanes_[i]->gyros[static_cast<std::size_t>(k)];

@@ -356,7 +356,8 @@ TRIHEDRON_INLINE M3 attitude_of(const Gyro (&gyro)[kGyros], const V3 (&h_c)[kGyr
       {x_c.x * x + (y_c.x * y + z_c.x * z), x_c.y * x + (y_c.y * y + z_c.y * z), x_c.z * x + (y_c.z * y + z_c.z * z)}};
 }
 
-/// core/precession.cpp, precess_two() with sensitivities, of one gyro.
+/// precess_two() of core/precession.cpp, of one gyro, step by step. The filter of core sums up short steps
+/// (StepsOfTwo), which is the same to a millionth of a sensitivity.
 TRIHEDRON_INLINE void precess(Gyro& gyro, Sensitivity& since, const M3& C_in_c, const V3& h, double dt_s) {
   const V3 s = times(h, h);
   const V3 q = times(s, s);
@@ -526,7 +527,7 @@ void fit(const Filter& filter, const Fit& its, const V3 (&at)[kGyros], FittedRea
   }
 }
 
-// ---- The root of the information (core/square_root_information.hpp)
+// ---- The root of the covariance (core/square_root_covariance.hpp)
 
 TRIHEDRON_INLINE V signed_norm(V first, V below) {
   const V norm = root(first * first + below);
@@ -563,23 +564,91 @@ TRIHEDRON_INLINE void rotate_into(V* triangle, int stride, V* extra, int extra_s
   }
 }
 
-/// M rows times the inverse of the triangle from state `first` on; those of the rows begin there.
+/// M rows times the root from state `first` on; those of the rows begin there.
 template <int M>
-TRIHEDRON_INLINE void see_through(const V* triangle, int first, V* rows, int stride) {
+TRIHEDRON_INLINE void see_through(const V* S, int first, V* rows, int stride) {
   const int columns = kStates - first;
-  for (int j = 0; j < columns; ++j) {
-    const V* its = triangle + (first + j) * kColumns + first;
-    const V by = 1 / its[j];
+  for (int j = columns - 1; j >= 0; --j) {
     V x[M];
+    Mask is_there{};
     for (int i = 0; i < M; ++i) {
-      x[i] = rows[i * stride + j] *= by;
+      x[i] = rows[i * stride + j];
+      is_there = is_there | (x[i] != 0);
+    }
+    if (!any(is_there)) {
+      continue;
+    }
+    const V* its = S + (first + j) * kStates + first;
+    for (int i = 0; i < M; ++i) {
+      rows[i * stride + j] = x[i] * its[j];
     }
     for (int k = j + 1; k < columns; ++k) {
       const V element = its[k];
       for (int i = 0; i < M; ++i) {
-        rows[i * stride + k] -= x[i] * element;
+        rows[i * stride + k] += x[i] * element;
       }
     }
+  }
+}
+
+/// take_measurements() of M rows, whose last column is what they show.
+template <int M>
+TRIHEDRON_INLINE void take_measurements(V* S, V* rows, V* correction) {
+  constexpr int kNumbers = 2 * M + 1;
+  V numbers[kStates * kNumbers];
+  see_through<M>(S, 0, rows, kColumns);
+  V variance[M];
+  V inverse[M];
+  V sums[M][M] = {};
+  for (int m = 0; m < M; ++m) {
+    variance[m] = inverse[m] = all(1);
+  }
+  for (int j = 0; j < kStates; ++j) {
+    V* c = numbers + j * kNumbers;
+    V* e = c + M;
+    V square = all(1);
+    for (int m = 0; m < M; ++m) {
+      V x = rows[m * kColumns + j];
+      for (int i = 0; i < m; ++i) {
+        const V before = x;
+        x -= c[i] * sums[m][i];
+        sums[m][i] += e[i] * before;
+      }
+      c[m] = x * inverse[m];
+      e[m] = square * x;
+      const V before = variance[m];
+      variance[m] += e[m] * x;
+      inverse[m] = 1 / variance[m];
+      square *= before * inverse[m];
+    }
+    e[M] = root(square);
+  }
+  V gain[M];
+  for (int m = 0; m < M; ++m) {
+    V rest = rows[m * kColumns + kStates];
+    for (int i = 0; i < m; ++i) {
+      rest -= sums[m][i] * gain[i];
+    }
+    gain[m] = rest * inverse[m];
+  }
+  for (int row = 0; row < kStates; ++row) {
+    V b[M] = {};
+    for (int j = row; j < kStates; ++j) {
+      const V* c = numbers + j * kNumbers;
+      const V* e = c + M;
+      V x = S[row * kStates + j];
+      for (int m = 0; m < M; ++m) {
+        const V before = x;
+        x -= c[m] * b[m];
+        b[m] += e[m] * before;
+      }
+      S[row * kStates + j] = e[M] * x;
+    }
+    V sum{};
+    for (int m = 0; m < M; ++m) {
+      sum += gain[m] * b[m];
+    }
+    correction[row] = sum;
   }
 }
 
@@ -608,12 +677,12 @@ TRIHEDRON_INLINE void put(V* rows, int stride, int column, const V3& its) {
 
 /// Covariance of what depends by these columns on the states from `first` on.
 template <int Columns>
-[[gnu::noinline]] M3 covariance_from(const V* triangle, int first, const V3 (&columns)[Columns]) {
+[[gnu::noinline]] M3 covariance_from(const V* S, int first, const V3 (&columns)[Columns]) {
   V rows[3 * kStates] = {};
   for (int j = 0; j < Columns; ++j) {
     put(rows, kStates, j, columns[j]);
   }
-  see_through<3>(triangle, first, rows, kStates);
+  see_through<3>(S, first, rows, kStates);
   return gram(rows, kStates - first, kStates);
 }
 
@@ -685,74 +754,41 @@ TRIHEDRON_INLINE V prediction_noise(Filter& filter, const M3& C_in_c, int k) {
   return root(walk * walk * time_s + (now * now - before * before));
 }
 
-/// SquareRootInformation::propagate().
+/// SquareRootCovariance::propagate().
 void propagate(Filter& filter, const V (&noise_rad)[kGyros]) {
   constexpr int d = kMoving;
-  V A_inverse[d * d] = {};
-  V B[d * kConstants] = {};
+  V F[d * kStates] = {};
   for (int k = 0; k < kGyros; ++k) {
     Sensitivity& since = filter.since_fix[k];
-    const M3 to_start = inverse({{since.by_start[0], since.by_start[1], since.by_start[2]}});
-    V* row = A_inverse + direction_of(k) * d;
-    for (int j = 0; j < 3; ++j) {
-      put(row, d, direction_of(k) + j, to_start.column[j]);
-    }
-    V* by = B + direction_of(k) * kConstants;
+    V* by = F + direction_of(k) * kStates;
     for (int j = 0; j < kCoefficients; ++j) {
-      put(by, kConstants, drift_of(k) - d + j, since.by_drift[j]);
+      put(by, kStates, drift_of(k) + j, since.by_drift[j]);
       since.by_drift[j] = zero3();
     }
     for (int j = 0; j < 3; ++j) {
-      put(by, kConstants, alignment_of(k) - d + j, since.by_alignment[j]);
+      put(by, kStates, direction_of(k) + j, since.by_start[j]);
+      put(by, kStates, alignment_of(k) + j, since.by_alignment[j]);
       since.by_alignment[j] = zero3();
       since.by_start[j] = axis(j);
     }
+    see_through<3>(filter.root, 0, by, kStates);
   }
-  V M[d * d];
   V reversed[d * d] = {};
-  V noises[d * d];
+  V moved[d * d];
   for (int i = 0; i < d; ++i) {
-    reversed[i * d + i] = all(1);
+    reversed[i * d + i] = noise_rad[(d - 1 - i) / 3];
     for (int j = 0; j < d; ++j) {
-      V sum{};
-      for (int k = i; k < d; ++k) {
-        sum += filter.root[i * kColumns + k] * A_inverse[k * d + j];
-      }
-      M[i * d + j] = sum;
-      noises[j * d + d - 1 - i] = sum * noise_rad[j / 3];
+      moved[j * d + d - 1 - i] = F[i * kStates + j];
     }
   }
-  rotate_into<d>(reversed, d, noises, d, d, d);
-  for (int i = d - 1; i >= 0; --i) {
-    V* row = filter.root + i * kColumns;
-    for (int k = 0; k < d; ++k) {
-      const V factor = M[i * d + k];
-      for (int column = 0; column < kConstants; ++column) {
-        row[d + column] -= factor * B[k * kConstants + column];
-      }
-      row[k] = factor;
+  rotate_into<d>(reversed, d, moved, d, d, d);
+  for (int i = 0; i < d; ++i) {
+    V* row = filter.root + i * kStates;
+    for (int j = i; j < d; ++j) {
+      row[j] = reversed[(d - 1 - j) * d + d - 1 - i];
     }
-    const V* U = reversed + (d - 1 - i) * (d + 1);  // on the diagonal
-    for (int below = i + 1; below < d; ++below) {
-      const V factor = U[(i - below) * d];
-      for (int column = 0; column < kStates; ++column) {
-        row[column] -= factor * filter.root[below * kColumns + column];
-      }
-    }
-    const V by = 1 / U[0];
-    for (int column = 0; column < kStates; ++column) {
-      row[column] *= by;
-    }
-  }
-  V* rows = filter.root;
-  rotate_into<5>(rows, kColumns, rows + kColumns, kColumns, kStates, 1);
-  rotate_into<4>(rows + (kColumns + 1), kColumns, rows + 2 * kColumns + 1, kColumns, kStates - 1, 1);
-  rotate_into<3>(rows + 2 * (kColumns + 1), kColumns, rows + 3 * kColumns + 2, kColumns, kStates - 2, 1);
-  rotate_into<2>(rows + 3 * (kColumns + 1), kColumns, rows + 4 * kColumns + 3, kColumns, kStates - 3, 1);
-  rotate_into<1>(rows + 4 * (kColumns + 1), kColumns, rows + 5 * kColumns + 4, kColumns, kStates - 4, 1);
-  for (int i = 1; i < d; ++i) {
-    for (int j = 0; j < i; ++j) {
-      rows[i * kColumns + j] = V{};
+    for (int j = d; j < kStates; ++j) {
+      row[j] = F[i * kStates + j];
     }
   }
   filter.time_since_fix_s = V{};
@@ -967,17 +1003,8 @@ void finish_fix(Filter& filter, Fix& fix) {
   for (V& its : fix.rows) {
     its = select(is_used, its, V{});
   }
-  rotate_into<kComponents>(filter.root, kColumns, fix.rows, kColumns, kColumns, kStates);
   V x[kStates];
-  for (int i = kStates - 1; i >= 0; --i) {
-    V* row = filter.root + i * kColumns;
-    V sum = row[kStates];
-    for (int j = i + 1; j < kStates; ++j) {
-      sum -= row[j] * x[j];
-    }
-    x[i] = sum / row[i];
-    row[kStates] = V{};
-  }
+  take_measurements<kComponents>(filter.root, fix.rows, x);
   for (int k = 0; k < kGyros; ++k) {
     Gyro& gyro = filter.gyro[k];
     const V* phi = x + direction_of(k);

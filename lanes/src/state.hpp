@@ -33,7 +33,7 @@ inline constexpr int kCoefficients = 7;  ///< of eq. (1): k0, μ12, μ23, μ31, 
 inline constexpr int kMoving = 6;
 inline constexpr int kStates = 26;
 inline constexpr int kConstants = kStates - kMoving;
-inline constexpr int kColumns = kStates + 1;  ///< of the root of the information, with what it is compared with
+inline constexpr int kColumns = kStates + 1;  ///< of the rows of a fix, with what they show
 inline constexpr int kComponents = 4;         ///< of a fix
 inline constexpr int kTerms = 4;              ///< of the polynomials through the readings around a fix
 
@@ -107,7 +107,7 @@ struct Sensitivity {
 struct Filter {
   Gyro gyro[kGyros];
   Sensitivity since_fix[kGyros];
-  V root[kStates * kColumns];
+  V root[kStates * kStates];  ///< of the covariance
   V time_since_fix_s;
   V3 h_b[kGyros];  ///< readings from which the next step starts
   V second_order_rad[kGyros];

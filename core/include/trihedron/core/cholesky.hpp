@@ -29,10 +29,10 @@ void solve_factorized(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b);
 /// In place: rows b become L⁻¹ b.
 void solve_lower(const MatrixView& L, RowsView b);
 
-/// The upper triangular root of the inverse of `covariance`, of which the lower triangle is used: rootᵀ root =
-/// covariance⁻¹. `root` is square and of the same size; below the diagonal it is left as it is. False, and `root` of no
-/// use, unless the covariance is positive definite and finite.
-[[nodiscard]] bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root);
+/// The upper triangular root of `covariance`, of which the lower triangle is used: root · rootᵀ = covariance. `root` is
+/// square and of the same size; below the diagonal it is left as it is. False, and `root` of no use, unless the
+/// covariance is positive definite and finite.
+[[nodiscard]] bool covariance_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root);
 
 /// L of a = L Lᵀ; of no use unless `a` is positive definite.
 template <int M>

@@ -54,7 +54,8 @@ template <class S>
 [[nodiscard]] RodriguesCoefficients<S> rodrigues_coefficients(S angle2) {
   using std::sqrt;
   if (angle2 < S(1e-6)) {  // the quotients would lose digits; the next terms of the series are below 1e-17
-    return {S(1) - angle2 / S(6) * (S(1) - angle2 / S(20)), S(0.5) - angle2 / S(24) * (S(1) - angle2 / S(30))};
+    return {S(1) - angle2 * S(1.0 / 6) * (S(1) - angle2 * S(1.0 / 20)),
+            S(0.5) - angle2 * S(1.0 / 24) * (S(1) - angle2 * S(1.0 / 30))};
   }
   const S angle = sqrt(angle2);
   const S half = elementary::sin(angle / S(2));

@@ -17,7 +17,7 @@
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/setup.hpp"
-#include "trihedron/core/square_root_information.hpp"
+#include "trihedron/core/square_root_covariance.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
@@ -54,9 +54,10 @@ class InvariantEstimator {
   static constexpr bool kTakesSamplesTogether = true;
   using Gyro = GyroModel<kCapacity.drift_columns>;
   using Gyros = PerGyro<Gyro, kCapacity.gyros>;
-  using Sensitivities = PerGyro<Sensitivity<kCapacity.drift_columns>, kCapacity.gyros>;
-  using Information = SquareRootInformation<kMaxStates, kMaxDynamic>;
-  using Vector = typename Information::Vector;
+  using Since = SensitivitiesOfAll<kCapacity.drift_columns, kCapacity.gyros>;
+  using Sensitivities = typename Since::All;
+  using Errors = SquareRootCovariance<kMaxStates, kMaxDynamic>;
+  using Vector = typename Errors::Vector;
   using Rows3 = StateRows3<kMaxStates>;
   using Shared = typename SharedVector<kCapacity.shared_states>::Type;
 
@@ -81,9 +82,10 @@ class InvariantEstimator {
   /// Estimates of the shared states, in the order of the layout.
   [[nodiscard]] const Shared& shared() const { return shared_; }
   /// How errors at the last fix have changed the present directions.
-  [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  [[nodiscard]] Sensitivities since_fix() const { return since_fix_.at_present(); }
   [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
-  [[nodiscard]] const Information& information() const { return information_; }
+  /// Errors of the estimates at the last fix.
+  [[nodiscard]] const Errors& errors() const { return errors_; }
   /// Prior means.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
 
@@ -103,7 +105,7 @@ class InvariantEstimator {
   }
 
   /// Square root of the covariance of all states, or of the first of them, at the last fix. Needs started().
-  void error_root(RowsView root) const { information_.inverse_root(root); }
+  void error_root(RowsView root) const { errors_.put_root(root); }
   /// The same of the prior, rows and columns from the first that is no direction up to the first shared one, into
   /// zeros.
   void prior_error_root(RowsView root) const;
@@ -124,18 +126,20 @@ class InvariantEstimator {
     enum class Stage : std::uint8_t {
       kBegin,        ///< starts the filter, or sees whether the readings give an attitude
       kSecondOrder,  ///< how much the linear model of the prediction leaves out
-      kPropagation,  ///< the information to the present time
+      kPropagation,  ///< the covariance to the present time
       kAttitude,     ///< the one to linearise at
       kNoise,        ///< of the readings
-      kJudgement,    ///< innovation and gate; of the angles, also the update
+      kJudgement,    ///< innovation and gate; of the angles, and of a fix at_once, also the update
       kFault,        ///< which gyro is at fault
       kRestart,
       kWidening,  ///< of all sigmas
-      kUpdate,    ///< of the information
+      kUpdate,    ///< of the covariance
       kFeedback,  ///< of the correction to the estimate
       kDone,
     };
     Stage stage = Stage::kBegin;
+    bool at_once =
+        false;  ///< the judgement may be followed by the update at once, which saves work; the bits are the same
     bool reopened = false;
     PerGyro<double, kCapacity.gyros> prediction_noise_rad;  ///< 1-sigma per axis of the directions
     PerGyro<double> reading_noise_rad;
@@ -164,14 +168,15 @@ class InvariantEstimator {
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
-  static constexpr int kMaxCompared = 2 * kCapacity.gyros;  ///< components of a comparison
+  static constexpr int kMaxStatesOfPrior = kMaxStates - 3 * kCapacity.gyros;  ///< all but the directions
+  static constexpr int kMaxCompared = 2 * kCapacity.gyros;                    ///< components of a comparison
   using Compared = ComparedRows<kMaxStates, kMaxCompared>;
   /// A comparison as whitened rows about the states, with its innovation covariance and NIS.
   struct White {
-    Compared rows;                   ///< (H, y), unit white noise
-    ComponentCovariance L;           ///< y of the comparison itself is L times that of the rows
-    ComponentCovariance covariance;  ///< of y in `rows`: 1 + H P Hᵀ
-    FixReport::Innovation y;         ///< that of `rows`, of unit variance
+    Compared seen;                   ///< H seen through the uncertainty, and y, of unit white noise
+    ComponentCovariance L;           ///< y of the comparison itself is L times that of `seen`
+    ComponentCovariance covariance;  ///< of y in `seen`: 1 + H P Hᵀ
+    FixReport::Innovation y;         ///< that of `seen`, of unit variance
     double nis = 0;
   };
 
@@ -215,7 +220,8 @@ class InvariantEstimator {
                                        const FixReadings& readings) const;
   /// The stages of take(), as they are named.
   void begin(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
-  void judge(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report);
+  void judge(Correction& correction, const Seen& its, const StarFix& fix, const FixReadings& readings,
+             FixReport& report);
   /// Of a fix within the gate: whether its innovation goes along with those before it.
   void look_for_correlation(Correction& correction, const White& white, FixReport& report);
   /// Makes all sigmas kWidening times as large, but no larger than those of the prior. The estimates stay, and with
@@ -226,6 +232,8 @@ class InvariantEstimator {
   void look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report) const;
   void update(Correction& correction, const Seen& its, const StarFix& fix, const FixReadings& readings,
               const FixReport& report);
+  /// The update by rows seen through the uncertainty, which are used up.
+  void use(Correction& correction, const StarFix& fix, Compared& seen, double weight);
   void judge_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
   /// Of what depends on the states from the `first` on alone, by these columns and no further ones.
@@ -289,7 +297,7 @@ class InvariantEstimator {
   /// nothing and may be chosen; this choice keeps φ_k − C_in_c δ_k small in all three axes, so that what is known
   /// of it across h_k stays true when the estimate of h_k moves (docs/mathematics.md, section 8).
   void follow_alignments(const FixReadings& readings);
-  /// Corrects the estimate by the update that the information has taken.
+  /// Corrects the estimate by the update that its errors have taken.
   void feed_back();
   /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
   [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
@@ -306,9 +314,9 @@ class InvariantEstimator {
   Gyros prior_gyros_;
   Gyros gyros_;
   Shared shared_;
-  Sensitivities since_fix_;
-  Information information_;
-  PackedTriangle<kMaxStates> prior_;  ///< root of the information, without anything of the directions
+  Since since_fix_;
+  Errors errors_;
+  PackedTriangle<kMaxStatesOfPrior> prior_;  ///< root of the covariance, behind the directions
   OutlierGate gate_;
   InnovationCorrelation<kMaxCompared> correlation_;
   std::array<std::optional<Time>, kStarTrackers> used_fix_t_;

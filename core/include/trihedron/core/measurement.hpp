@@ -8,7 +8,7 @@
 #include "trihedron/core/layout.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/setup.hpp"
-#include "trihedron/core/square_root_information.hpp"
+#include "trihedron/core/square_root_covariance.hpp"
 
 namespace trihedron {
 
@@ -108,6 +108,16 @@ using StateRows3 = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 
 
 /// In place: R becomes its Cholesky factor L, and the rows L⁻¹ times themselves, of unit white noise.
 void whiten(ComponentCovariance& R, RowsView rows);
+
+/// The columns of rows that are about states.
+template <class Derived>
+[[nodiscard]] RowsView states_of(Eigen::PlainObjectBase<Derived>& rows) {
+  const RowsView all = rows_of(rows);
+  return {all.data, all.rows, all.columns - 1, all.stride};
+}
+
+/// L · covariance · Lᵀ: of components that were divided by L, before that.
+[[nodiscard]] ComponentCovariance before_whitening(const ComponentCovariance& L, const ComponentCovariance& covariance);
 
 /// Puts m times the columns of a gyro's drift where the layout has them.
 template <class M, class Rows>

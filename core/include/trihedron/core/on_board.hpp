@@ -156,14 +156,14 @@ class OnBoard {
   };
   /// What takes how long, about, in 100 instructions on two gyros with eq. (1).
   struct Cost {
-    static constexpr int kSample = 32;
+    static constexpr int kSample = 28;
     static constexpr int kBeginning = 170;
     static constexpr int kStarting = 300;  ///< the filter, by its first fix
-    static constexpr int kCalibrated = 90;
+    static constexpr int kCalibrated = 65;
     static constexpr int kNavigatedSample = 16;
     static constexpr int kTakingOver = 250;
-    static constexpr int kNavigated = 135;
-    static constexpr int kReport = 215;  ///< what is made of the report, such as a forecast
+    static constexpr int kNavigated = 95;
+    static constexpr int kReport = 180;  ///< what is made of the report, such as a forecast
   };
   /// Fixes that have become due wait for the one that is dealt with: with one of them, its work has so many samples
   /// left; with two, half as many; with more than these, all is done at once.

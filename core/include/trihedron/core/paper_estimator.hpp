@@ -14,12 +14,12 @@
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/setup.hpp"
-#include "trihedron/core/square_root_information.hpp"
+#include "trihedron/core/square_root_covariance.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
 
-/// Kalman filter on eq. (3) with the full correlated noise, in square-root information form; two gyros, eq. (1), one
+/// Kalman filter on eq. (3) with the full correlated noise, in square-root form; two gyros, eq. (1), one
 /// star tracker. Estimates are held in `gyros()`; the filter knows their errors, Δh = h(true) − h(est), κ(true) −
 /// κ(est), and δ with C_c_b(true) = exp([δ×]) C_c_b(est). H is taken at the raw star-tracker attitude, as in the paper:
 /// in steady flight the filter therefore gains information that does not exist, and its sigmas about the orbit normal
@@ -44,7 +44,8 @@ class PaperEstimator {
   static constexpr bool kTakesSamplesTogether = false;  ///< a fix is compared with a single sample
   using Gyro = GyroModel<Esg7::kSize>;
   using Gyros = PerGyro<Gyro, kGyros>;
-  using Sensitivities = PerGyro<Sensitivity<Esg7::kSize>, kGyros>;
+  using Since = SensitivitiesOfAll<Esg7::kSize, kGyros>;
+  using Sensitivities = Since::All;
   using Rows3 = StateRows3<kMaxErrors>;
 
   /// As of InvariantEstimator; kTooLarge for any other layout than Layout{}.
@@ -62,8 +63,8 @@ class PaperEstimator {
   [[nodiscard]] static constexpr Layout error_layout() { return {}; }
   [[nodiscard]] const DriftModel& drift() const { return drift_; }
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
-  /// Effect of the errors at the last fix on the present directions.
-  [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  /// As of InvariantEstimator.
+  [[nodiscard]] Sensitivities since_fix() const { return since_fix_.at_present(); }
   [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
   /// What was known before.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
@@ -95,6 +96,7 @@ class PaperEstimator {
   struct Correction {
     enum class Stage : std::uint8_t { kPropagation, kDone };
     Stage stage = Stage::kPropagation;
+    bool at_once = false;  ///< not looked at, since there is one stage
     static constexpr bool reopened = false;
 
     [[nodiscard]] bool done() const { return stage == Stage::kDone; }
@@ -133,26 +135,29 @@ class PaperEstimator {
                                            const FixCovariance& covariance = {});
 
  private:
-  using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
+  using Errors = SquareRootCovariance<kMaxStates, States::kDynamic>;
 
   /// Whether the estimate is finite and has a covariance.
-  [[nodiscard]] bool sound() const { return information_.regular() && estimates_are_finite(gyros_, layout()); }
+  [[nodiscard]] bool sound() const { return errors_.regular() && estimates_are_finite(gyros_, layout()); }
   /// correct() before sound() is asked.
   [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
+  /// The momenta are those of the fix, all else is as before it.
+  void start(const Measurement& measurement);
   void update_covariance_to_now(const QuasiInertial& now);
-  /// Innovation, its covariance and NIS; `rows`: the measurement whitened, L: the root of its noise.
-  void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows, const Eigen::Matrix4d& L,
-                         FixReport& report) const;
-  void feed_back(const Information::Vector& correction);
+  /// Innovation, its covariance and NIS; `seen`: the measurement whitened and seen through the uncertainty, L: the root
+  /// of its noise.
+  static void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& seen,
+                                const ComponentCovariance& L, FixReport& report);
+  void feed_back(const Errors::Vector& correction);
 
   CalibrationSetup setup_;
   DriftModel drift_;
   Gyros prior_gyros_;
   Gyros gyros_;
-  Sensitivities since_fix_;
-  QuasiInertial qi_;  ///< basis of the direction errors in information_
-  Information information_;
-  Information prior_;  ///< of the parameters alone
+  Since since_fix_;
+  QuasiInertial qi_;  ///< basis of the direction errors in errors_
+  Errors errors_;
+  Errors prior_;  ///< of the parameters alone
   OutlierGate gate_;
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;

@@ -3,6 +3,8 @@
 /// (docs/mathematics.md, section 6).
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "trihedron/core/columns.hpp"
@@ -61,6 +63,13 @@ struct Sensitivity {
   }
 };
 
+/// A vector whose length is 1 to rounding, without what rounding has added: v (3 − v²)/2, one step of Newton's method
+/// for 1/√v², which waits for no root and no quotient. Added up in this order the factor is exactly 1 where v² is off
+/// by its last digit alone, so that once is as good as twice.
+[[nodiscard]] inline Eigen::Vector3d kept_unit(const Eigen::Vector3d& v) {
+  return (2 - (0.5 + 0.5 * v.squaredNorm())) * v;
+}
+
 /// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
 /// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit.
 template <int Max>
@@ -68,7 +77,7 @@ void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3
              const DriftTime& time, double dt_s) {
   const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(h_b), time, gyro.drift_rad_s.data());
   const Eigen::Vector3d omega_in = C_in_c * (gyro.C_c_b * omega_b);
-  gyro.h_in = rotated<double>(gyro.h_in, omega_in * dt_s).normalized();
+  gyro.h_in = kept_unit(rotated<double>(gyro.h_in, omega_in * dt_s));
 }
 
 /// precess(), and the sensitivities beside it: dφ/dt = ω × φ + C_in_b B Δκ + (C_in_c δ) × ω. Returns the rotation that
@@ -81,7 +90,7 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   drift.basis(gyro.corrected(h_b), time, columns.view(size));
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
   const Eigen::Vector3d turn = dt_C_in_b * columns.view(size).times(gyro.drift_rad_s.data());
-  gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
+  gyro.h_in = kept_unit(rotated<double>(gyro.h_in, turn));
   sensitivity.advance(columns.view(size), C_in_c, dt_C_in_b, turn);
   return turn;
 }
@@ -116,11 +125,65 @@ struct SensitivityOfEq1 {
         by_drift(its.by_drift.view(Esg7::kSize)) {}
 };
 
+/// What the sensitivities of two gyros, side by side, gain in some short steps in which the momenta hardly turn: sums
+/// over the steps, to which the turn of what is already there is added when they are taken over.
+class StepsOfTwo {
+ public:
+  static constexpr int kMost = 64;
+  /// The momenta turn by less in all steps together. What is left out is at most half of that, as a part of a
+  /// sensitivity, where one step is much longer than the others; a hundredth of it where steps are even.
+  static constexpr double kMostTurn_rad = 1e-5;
+
+  [[nodiscard]] bool empty() const { return steps_ == 0; }
+  void clear() {
+    steps_ = 0;
+    sums_.fill(0);
+  }
+  /// The sensitivities of one of the two over the steps; zero behind the columns of eq. (1).
+  template <int Max>
+  [[nodiscard]] Sensitivity<Max> of(int which) const {
+    Sensitivity<Max> its;
+    const Eigen::Matrix3d turn = skew<double>(column(kTurn, which));
+    // Each step turns the sums of those before it: of even steps, of n in all, by half of n − 1 of n parts of the turn.
+    const Eigen::Matrix3d by_sums = Eigen::Matrix3d::Identity() + 0.5 * (1 - 1 / static_cast<double>(steps_)) * turn;
+    its.by_start.noalias() += turn * by_sums;
+    auto by_drift = its.by_drift.view(Esg7::kSize);
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      by_drift.set_column(i, by_sums * column(kDrift + i, which));
+    }
+    for (int i = 0; i < 3; ++i) {
+      its.by_alignment.col(i) = by_sums * column(kAlignment + i, which);
+    }
+    return its;
+  }
+
+ private:
+  friend struct PrecessingTwo;
+  static constexpr int kTurn = 0;
+  static constexpr int kAlignment = 1;
+  static constexpr int kDrift = 4;
+  static constexpr int kColumns = kDrift + Esg7::kSize;
+
+  /// A column of both: x, y, z, of each that of one gyro and then that of the other.
+  [[nodiscard]] double* at(int column) { return &sums_[static_cast<std::size_t>(6 * column)]; }
+  [[nodiscard]] Eigen::Vector3d column(int i, int which) const {
+    const double* its = &sums_[static_cast<std::size_t>(6 * i + which)];
+    return {its[0], its[2], its[4]};
+  }
+
+  std::array<double, 6 * kColumns> sums_{};
+  int steps_ = 0;
+};
+
 /// precess() of two gyros side by side whose drift is eq. (1) alone: the same bits in half the instructions.
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
 /// The same with sensitivities.
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
                  const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s);
+/// The same, their sensitivities by sums. False, and nothing is done, where there are too many steps or too much of a
+/// turn for that.
+[[nodiscard]] bool precess_two(const PrecessingGyro& a, const PrecessingGyro& b, StepsOfTwo& steps,
+                               const Eigen::Matrix3d& C_in_c, double dt_s);
 /// The same of two whose drift has more than the sensitivities to eq. (1) are about: rates ω_b, rad/s, case axes.
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
                  const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s,
@@ -142,22 +205,81 @@ void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::
     }
   }
 }
-/// The same with their sensitivities.
-template <class Gyros, class Sensitivities, class Times>
-void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
-                 const Directions& h_b, const Times& times, double dt_s) {
-  const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
-  for (int k = 0; k < in_pairs; k += 2) {
-    precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
-                SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
+/// Sensitivities of gyros, of which those that go in pairs are brought up to the present time only where settled.
+template <int Max, int N>
+class SensitivitiesOfAll {
+ public:
+  using All = PerGyro<Sensitivity<Max>, N>;
+
+  /// At the reference epoch.
+  void begin(int columns) {
+    for (Sensitivity<Max>& its : since_) {
+      its.begin(columns);
+    }
+    for (StepsOfTwo& its : steps_) {
+      its.clear();
+    }
+    is_settled_.fill(false);
   }
-  if (in_pairs < count) {
-    const DriftTimes now = times();
-    for (int k = in_pairs; k < count; ++k) {
-      precess(gyros[k], since[k], drift, C_in_c, h_b[k], now[k], dt_s);
+  /// Brings all to the present time.
+  void settle() {
+    for (int pair = 0; pair < N / 2; ++pair) {
+      settle(pair);
     }
   }
-}
+  /// Where settled.
+  [[nodiscard]] All& all() { return since_; }
+  [[nodiscard]] All at_present() const {
+    All its = since_;
+    for (int pair = 0; pair < N / 2; ++pair) {
+      append_steps(pair, its);
+    }
+    return its;
+  }
+
+  /// precess() of the first `count` gyros, with their sensitivities; times() as above.
+  template <class Gyros, class Times>
+  void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
+                   const Directions& h_b, const Times& times, double dt_s) {
+    const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
+    for (int k = 0; k < in_pairs; k += 2) {
+      const PrecessingGyro a(gyros[k], h_b[k]);
+      const PrecessingGyro b(gyros[k + 1], h_b[k + 1]);
+      if (!precess_two(a, b, steps_[static_cast<std::size_t>(k / 2)], C_in_c, dt_s)) {
+        settle(k / 2);
+        precess_two(a, b, SensitivityOfEq1(since_[k]), SensitivityOfEq1(since_[k + 1]), C_in_c, dt_s);
+      }
+    }
+    if (in_pairs < count) {
+      const DriftTimes now = times();
+      for (int k = in_pairs; k < count; ++k) {
+        precess(gyros[k], since_[k], drift, C_in_c, h_b[k], now[k], dt_s);
+      }
+    }
+  }
+
+ private:
+  void settle(int pair) {
+    append_steps(pair, since_);
+    is_settled_[static_cast<std::size_t>(pair)] = true;
+    steps_[static_cast<std::size_t>(pair)].clear();
+  }
+  void append_steps(int pair, All& since) const {
+    const StepsOfTwo& steps = steps_[static_cast<std::size_t>(pair)];
+    for (int k = 0; k < 2 && !steps.empty(); ++k) {
+      Sensitivity<Max>& its = since[2 * pair + k];
+      if (is_settled_[static_cast<std::size_t>(pair)]) {
+        its.append(steps.of<Max>(k), Esg7::kSize);
+      } else {
+        its = steps.of<Max>(k);
+      }
+    }
+  }
+
+  All since_;
+  std::array<StepsOfTwo, N / 2> steps_;
+  std::array<bool, N / 2> is_settled_{};  ///< before, since the begin
+};
 
 /// exp([δ×]) C_c_b, through the quaternion, so that rounding cannot accumulate in the matrix over months of fixes.
 [[nodiscard]] Eigen::Matrix3d turned(const Eigen::Matrix3d& C_c_b, const Eigen::Vector3d& delta);
@@ -167,7 +289,8 @@ struct GaussMarkov {
   double sigma = 0;  ///< stationary
   double time_s = 3600;
 
-  /// The fraction of a value that is left after dt_s; not below 1e-6, since its inverse stands in the transition.
+  /// The fraction of a value that is left after dt_s; not below 1e-6, since its inverse stands in the transition of the
+  /// batch.
   [[nodiscard]] double kept(double dt_s) const;
   /// 1-sigma of the noise that has come in its place.
   [[nodiscard]] double noise(double kept) const;
