@@ -27,10 +27,8 @@ def prediction_operations():
     to_inertial = 45 + 9  # C_in_c C_c_b, times the step
     turn = 3 * 13  # the columns times κ, then turned
     momentum = 5 + 9 + 9 + 12 + 9  # its rotation, and to unit length
-    start = 45  # (1 + turn×) by_start
-    alignment = 9 + 45 + 9
-    drift = 7 * (6 + 3 + 15)  # turn × column, sum, C_in_b B
-    return basis + to_inertial + turn + momentum + start + alignment + drift
+    sums = 3 + 3 * (9 + 3) + 15 + 3 * 9 + 3 * 3 + 7 * 3  # of the turn; turn × C_in_c; C_in_b B, whose columns have few entries
+    return basis + to_inertial + turn + momentum + sums
 
 
 def attitude_operations():
@@ -40,17 +38,24 @@ def attitude_operations():
     return readings + axes + 45
 
 
-def fix_operations(n=26, d=6, m=4):
-    """Of the square-root information filter, n states of which d move, m components."""
-    propagate = 2 * (d * d * d // 2 + d * d * (n - d))  # R A⁻¹, and its constants
-    noise = sum(4 * d * (d + n - j) for j in range(d))  # w eliminated by reflections
-    triangle = sum(4 * (d - j) * (n - j) for j in range(d - 1))
-    update = sum(4 * (m + 1) * (n + 1 - j) for j in range(n))
-    # What is seen through the uncertainty: innovation and attitude; and the four terms of second order of each gyro, which hold for
-    # 30 s where they are small (docs/mathematics.md, section 8).
-    seen = sum(count * size * size for count, size in [(m, n), (3, n)])
-    second_order = sum(3 * size * size for size in (n, n - 3, n - d, 10, 13, 3, 13, 3))
-    return propagate + noise + triangle + update + seen + second_order // (HOLD_S // FIX_PERIOD_S)
+def fix_operations(n=26, d=6, m=4, parameters=10):
+    """Of the square root of the covariance, n states of which d move, m components."""
+    def seen(states):
+        """A row with entries for these states, times the root."""
+        return sum(2 * (n - state) for state in states)
+    gyros = d // 3
+    drift = [range(d + k * parameters, d + (k + 1) * parameters) for k in range(gyros)]
+    alignments = [state for its in drift for state in its[-3:]]
+    propagate = sum(3 * seen([*range(3 * k, 3 * k + 3), *drift[k]]) for k in range(gyros))
+    noise = sum(4 * (d + 1) * (d - j) for j in range(d))
+    directions_and_alignments = [*range(d), *alignments]
+    innovation = m * seen(directions_and_alignments) + m * (m + 1) * n
+    attitude = 3 * seen(directions_and_alignments) + 12 * n
+    update = (4 * m + 1) * n * (n + 1) // 2 + n * (6 * m + 4 * m * (m - 1) // 2) + 2 * m * n
+    # The four terms of second order of each gyro, which hold for 30 s where they are small (docs/mathematics.md, section 8).
+    second_order = sum(3 * seen(its) + 12 * n for k in range(gyros) for its in
+                       (alignments[3 * k:3 * k + 3], drift[k][:-3], alignments[3 * k:3 * k + 3], [*range(3 * k, 3 * k + 3), *alignments[3 * k:3 * k + 3]]))
+    return propagate + noise + innovation + attitude + update + second_order // (HOLD_S // FIX_PERIOD_S)
 
 
 FILE_BYTES = SAMPLES * (8 + 6 * 8) + FIXES * (8 + 4 * 8)  # of the pass as doubles
@@ -68,10 +73,10 @@ WHY = {
     "read NetCDF": "inflating the chunks, then one pass that scales the packed integers and one that screens",
     "read CSV": "1.6 characters a byte, each looked at once, and decimal numbers to the nearest double",
     "intake": "branches: finite, unit, not stuck, the clock; an operation is the smaller part of a check",
-    "prediction": "products of 3 × 3 are scalar (`EIGEN_DONT_VECTORIZE`: the same bits everywhere), loads and stores of a state in memory; "
-                  "and a chain: each step needs the attitude that the last one gives",
-    "fixes": "rows of 26 and fewer, two doubles an instruction (the baseline of x86-64), each with its loop; the stages keep nothing but "
-             "their results for one another (32 KiB of state, 16 KiB of stack), so that the triangle is gone through again by each",
+    "prediction": "both gyros in an instruction, but loads and stores of a state in memory; the time is that of a chain: each step needs the attitude "
+                  "that the last one gives",
+    "fixes": "the root is a third of it, four doubles an instruction where there is AVX2; the rest are products of 3 × 3, which are scalar "
+             "(`EIGEN_DONT_VECTORIZE`: the same bits everywhere), checks and reports, none of which the floor counts",
     "filter": "as prediction and fixes",
 }
 
