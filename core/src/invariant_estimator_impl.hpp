@@ -552,7 +552,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 12> kCosts = {25, 75, 70, 65, 65, 105, 300, 150, 450, 140, 25, 0};
+  constexpr std::array<int, 12> kCosts = {25, 75, 70, 65, 65, 105, 300, 150, 80, 140, 25, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 
@@ -666,8 +666,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       correction.stage = Stage::kDone;
       break;
     case Stage::kWidening:
-      widen();
-      correction.stage = Stage::kUpdate;
+      widen(correction);
       break;
     case Stage::kUpdate:
       update(correction, seen(fix, readings), fix, readings, report);
@@ -755,8 +754,20 @@ void InvariantEstimator<kCapacity>::look_for_correlation(Correction& correction,
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::widen() {
-  errors_.widen(kWidening, prior_, layout().direction(layout().gyros), layout().dynamic());
+void InvariantEstimator<kCapacity>::widen(Correction& correction) {
+  if (correction.widened == 0) {
+    errors_.scale(kWidening);
+  }
+  // A part at a time, since all of it takes longer than a slot may.
+  constexpr int kParts = 10;
+  const int constants = layout().constants();
+  const int first = correction.widened;
+  const int end = std::min(first + std::max((constants + kParts - 1) / kParts, 2), constants);
+  const int dynamic = layout().dynamic();
+  errors_.take_prior(prior_, layout().direction(layout().gyros), dynamic + first, dynamic + end,
+                     std::sqrt(1 - 1 / (kWidening * kWidening)));
+  correction.widened = end;
+  correction.stage = end < constants ? Correction::Stage::kWidening : Correction::Stage::kUpdate;
 }
 
 template <Capacity kCapacity>

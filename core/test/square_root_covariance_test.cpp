@@ -200,7 +200,10 @@ TEST(SquareRootCovariance, WidensToThePriorAtMost) {
     prior.pack(rows_of(prior_root));
     auto filter = with_root<Filter>(0.1 * random_triangle(kStates, random));
     const Matrix before = covariance(filter).inverse();
-    filter.widen(kFactor, prior, kBefore, first);
+    filter.scale(kFactor);
+    const double part = std::sqrt(1 - 1 / (kFactor * kFactor));
+    filter.take_prior(prior, kBefore, first, first + 1, part);  // in two parts
+    filter.take_prior(prior, kBefore, first + 1, kStates, part);
     // Rows of the prior from `first` on tell nothing of the states before it.
     const Matrix told = prior_root.inverse().bottomRows(kStates - first);
     Matrix expected = before / (kFactor * kFactor);

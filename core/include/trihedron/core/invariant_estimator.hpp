@@ -141,6 +141,7 @@ class InvariantEstimator {
     bool at_once =
         false;  ///< the judgement may be followed by the update at once, which saves work; the bits are the same
     bool reopened = false;
+    int widened = 0;                                        ///< constants whose prior the widened sigmas have taken
     PerGyro<double, kCapacity.gyros> prediction_noise_rad;  ///< 1-sigma per axis of the directions
     PerGyro<double> reading_noise_rad;
     Eigen::Matrix3d C_linear = Eigen::Matrix3d::Identity();
@@ -149,8 +150,8 @@ class InvariantEstimator {
     /// The covariance is already that after the fix, the estimate not yet.
     [[nodiscard]] bool awaits_feedback() const { return stage == Stage::kFeedback; }
   };
-  /// Stages of a correction, at most; those of a reopening come twice.
-  static constexpr int kMostStages = 13;
+  /// Stages of a correction, at most; those of a reopening come twice, and a widening has ten.
+  static constexpr int kMostStages = 23;
   /// What the next stage takes, about, in 100 instructions on two gyros with eq. (1), where no term of second order is
   /// held; and all from it on, as it usually goes.
   [[nodiscard]] static int cost(const Correction& correction);
@@ -226,7 +227,7 @@ class InvariantEstimator {
   void look_for_correlation(Correction& correction, const White& white, FixReport& report);
   /// Makes all sigmas kWidening times as large, but no larger than those of the prior. The estimates stay, and with
   /// them what they are off by.
-  void widen();
+  void widen(Correction& correction);
   /// Of a fix above the gate: whether a lower weight takes it.
   static void use_all_the_same(Correction& correction, FixReport& report);
   void look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report) const;

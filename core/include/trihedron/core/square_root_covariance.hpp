@@ -165,19 +165,21 @@ class SquareRootCovariance {
   /// Of the update before it, to be fed back.
   [[nodiscard]] Vector correction() const { return Eigen::Map<const Vector>(correction_.data(), states_); }
 
-  /// Makes all sigmas so many times as large, but no larger than those of a prior of the states from `first` on:
-  /// P⁻¹ ← P⁻¹ / factor² + (1 − 1/factor²) P₀⁻¹. `prior`: the root of P₀, without the first states, so
-  /// many as `before`.
-  template <int MaxOfPrior>
-  void widen(double factor, const PackedTriangle<MaxOfPrior>& prior, int before, int first) {
+  /// Makes all sigmas so many times as large.
+  void scale(double factor) {
     for (int i = 0; i < states_; ++i) {
       std::for_each(root().row(i) + i, root().row(i) + states_, [factor](double& its) { its *= factor; });
     }
-    // What the prior tells of a state and those behind it, as measurements of zero: rows of the inverse of its root.
-    const double part = std::sqrt(1 - 1 / (factor * factor));
+  }
+  /// P⁻¹ ← P⁻¹ + part² RᵀR, R the rows from the state `first` up to `end` of the inverse of the root of a prior, which
+  /// is without the first states, so many as `before`: what it tells of these states, given those behind them. All rows
+  /// after scale(factor), with part² = 1 − 1/factor², make all sigmas so many times as large, but no larger than those
+  /// of the prior.
+  template <int MaxOfPrior>
+  void take_prior(const PackedTriangle<MaxOfPrior>& prior, int before, int first, int end, double part) {
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMeasurementsAtOnce, Max + 1> rows;
-    for (int i = first; i < states_; i += kMeasurementsAtOnce) {
-      rows.setZero(std::min(kMeasurementsAtOnce, states_ - i), states_ + 1);
+    for (int i = first; i < end; i += kMeasurementsAtOnce) {
+      rows.setZero(std::min(kMeasurementsAtOnce, end - i), states_ + 1);
       for (int k = 0; k < static_cast<int>(rows.rows()); ++k) {
         prior.put_inverse(i + k - before, &rows(k, i + k));
       }
