@@ -565,7 +565,8 @@ int InvariantEstimator<kCapacity>::cost_to_end(const Correction& correction) {
     next.stage = static_cast<Stage>(stage);
     const bool is_unusual =
         next.stage == Stage::kFault || next.stage == Stage::kRestart || next.stage == Stage::kWidening;
-    sum += is_unusual && next.stage != correction.stage ? 0 : cost(next);
+    const int times = next.stage == Stage::kWidening ? correction.widening_left : 1;
+    sum += is_unusual && next.stage != correction.stage ? 0 : times * cost(next);
   }
   return sum;
 }
@@ -755,19 +756,16 @@ void InvariantEstimator<kCapacity>::look_for_correlation(Correction& correction,
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::widen(Correction& correction) {
-  if (correction.widened == 0) {
+  constexpr int kParts = Correction::kWideningParts;
+  const int part = kParts - correction.widening_left;
+  if (part == 0) {
     errors_.scale(kWidening);
   }
-  // A part at a time, since all of it takes longer than a slot may.
-  constexpr int kParts = 10;
-  const int constants = layout().constants();
-  const int first = correction.widened;
-  const int end = std::min(first + std::max((constants + kParts - 1) / kParts, 2), constants);
-  const int dynamic = layout().dynamic();
-  errors_.take_prior(prior_, layout().direction(layout().gyros), dynamic + first, dynamic + end,
+  const auto begin_of = [this](int its) { return layout().dynamic() + layout().constants() * its / kParts; };
+  errors_.take_prior(prior_, layout().direction(layout().gyros), begin_of(part), begin_of(part + 1),
                      std::sqrt(1 - 1 / (kWidening * kWidening)));
-  correction.widened = end;
-  correction.stage = end < constants ? Correction::Stage::kWidening : Correction::Stage::kUpdate;
+  --correction.widening_left;
+  correction.stage = correction.widening_left > 0 ? Correction::Stage::kWidening : Correction::Stage::kUpdate;
 }
 
 template <Capacity kCapacity>

@@ -27,6 +27,13 @@ using Lanes4 = double __attribute__((vector_size(32)));
 [[gnu::always_inline]] inline void get(const double* at, Lanes4& lanes) { std::memcpy(&lanes, at, sizeof lanes); }
 [[gnu::always_inline]] inline void put(const Lanes4& lanes, double* at) { std::memcpy(at, &lanes, sizeof lanes); }
 
+/// Vectors that are worked on side by side: as many as the registers of the processor hold beside their sums.
+#ifdef __x86_64__
+constexpr int kSideBySide = 2;
+#else
+constexpr int kSideBySide = 1;
+#endif
+
 template <class L>
 constexpr int width() {
   return static_cast<int>(sizeof(L) / sizeof(double));
@@ -205,7 +212,7 @@ template <class L, std::size_t M>
     x[i] = rows.row(static_cast<int>(i));
   }
   const Runs<M> runs(x, root.rows);
-  constexpr int kAtOnce = 2 * width<L>();
+  constexpr int kAtOnce = kSideBySide * width<L>();
   int done = root.columns;
   if (done % 2 != 0) {
     see_through_columns<double, 1>(root, runs, --done, x);
@@ -219,7 +226,7 @@ template <class L, std::size_t M>
     see_through_columns<L, 1>(root, runs, done, x);
   }
   for (int j = done - kAtOnce; j >= 0; j -= kAtOnce) {
-    see_through_columns<L, 2>(root, runs, j, x);
+    see_through_columns<L, kSideBySide>(root, runs, j, x);
   }
 }
 
@@ -527,7 +534,7 @@ void take_together(RowsView root, RowsView rows, double* numbers, double* correc
     return;
   }
 #endif
-  update_all_rows<Lanes, 2>(root, by, correction);
+  update_all_rows<Lanes, kSideBySide>(root, by, correction);
 }
 
 }  // namespace

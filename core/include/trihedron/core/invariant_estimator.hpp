@@ -123,6 +123,7 @@ class InvariantEstimator {
   /// A correction of the estimate, and what its stages leave for one another. Between two of them the estimate is not
   /// predicted; all else may be asked, and is that of the stages that have been carried out.
   struct Correction {
+    static constexpr int kWideningParts = 10;
     enum class Stage : std::uint8_t {
       kBegin,        ///< starts the filter, or sees whether the readings give an attitude
       kSecondOrder,  ///< how much the linear model of the prediction leaves out
@@ -138,10 +139,10 @@ class InvariantEstimator {
       kDone,
     };
     Stage stage = Stage::kBegin;
-    bool at_once =
-        false;  ///< the judgement may be followed by the update at once, which saves work; the bits are the same
+    /// The judgement may do the update as well, which saves work; the bits are the same.
+    bool at_once = false;
     bool reopened = false;
-    int widened = 0;                                        ///< constants whose prior the widened sigmas have taken
+    int widening_left = kWideningParts;                     ///< parts of the prior that widened sigmas have yet to take
     PerGyro<double, kCapacity.gyros> prediction_noise_rad;  ///< 1-sigma per axis of the directions
     PerGyro<double> reading_noise_rad;
     Eigen::Matrix3d C_linear = Eigen::Matrix3d::Identity();
