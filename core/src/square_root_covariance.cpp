@@ -56,6 +56,18 @@ template <class L, class Work>
   }
 }
 
+/// Calls work() with the number, from 1 to Most, as a constant: what is larger is Most.
+template <std::size_t Most, class Work>
+[[gnu::always_inline]] inline void with_constant(int number, const Work& work) {
+  if constexpr (Most > 1) {
+    if (number < static_cast<int>(Most)) {
+      with_constant<Most - 1>(number, work);
+      return;
+    }
+  }
+  work(std::integral_constant<std::size_t, Most>{});
+}
+
 /// One Householder reflection of row `r` and M rows below each other, all columns from 1 on; v: the M entries of the
 /// first column.
 template <class L, std::size_t M>
@@ -108,33 +120,11 @@ template <class L>
 [[gnu::always_inline]] inline void rotate_all_into(RowsView root, RowsView extra, int eliminated) {
   constexpr int kAtOnce = 8;
   for (int first = 0; first < extra.rows; first += kAtOnce) {
-    const RowsView some{extra.row(first), std::min(extra.rows - first, kAtOnce), extra.columns, extra.stride};
-    switch (some.rows) {
-      case 1:
-        rotate_rows_into<L, 1>(root, some, eliminated);
-        break;
-      case 2:
-        rotate_rows_into<L, 2>(root, some, eliminated);
-        break;
-      case 3:
-        rotate_rows_into<L, 3>(root, some, eliminated);
-        break;
-      case 4:
-        rotate_rows_into<L, 4>(root, some, eliminated);
-        break;
-      case 5:
-        rotate_rows_into<L, 5>(root, some, eliminated);
-        break;
-      case 6:
-        rotate_rows_into<L, 6>(root, some, eliminated);
-        break;
-      case 7:
-        rotate_rows_into<L, 7>(root, some, eliminated);
-        break;
-      default:
-        rotate_rows_into<L, 8>(root, some, eliminated);
-        break;
-    }
+    const RowsView some{extra.row(first), extra.rows - first, extra.columns, extra.stride};
+    with_constant<kAtOnce>(
+        some.rows, [&](auto rows) __attribute__((always_inline)) {
+          rotate_rows_into<L, decltype(rows)::value>(root, some, eliminated);
+        });
   }
 }
 
@@ -234,27 +224,16 @@ template <class L>
 [[gnu::always_inline]] inline void see_all_through(ConstRowsView root, RowsView rows) {
   constexpr int kAtOnce = 4;
   for (int first = 0; first < rows.rows; first += kAtOnce) {
-    const RowsView some{rows.row(first), std::min(rows.rows - first, kAtOnce), rows.columns, rows.stride};
-    switch (some.rows) {
-      case 1:
-        see_through_together<L, 1>(root, some);
-        break;
-      case 2:
-        see_through_together<L, 2>(root, some);
-        break;
-      case 3:
-        see_through_together<L, 3>(root, some);
-        break;
-      default:
-        see_through_together<L, 4>(root, some);
-        break;
-    }
+    const RowsView some{rows.row(first), rows.rows - first, rows.columns, rows.stride};
+    with_constant<kAtOnce>(
+        some.rows, [&](auto count)
+                       __attribute__((always_inline)) { see_through_together<L, decltype(count)::value>(root, some); });
   }
 }
 
-/// What M measurements make of a root S, one column after the other (docs/mathematics.md, section 9). In column j of
-/// each row of S, x, and with the row's sums b, for each measurement: x ← x − c b, b ← b + e x with the x before it; in
-/// the end x ← p x.
+/// What M measurements make of a root S, one column after the other (docs/mathematics.md, section 9). For the number x
+/// of a row of S in that column and the row's sums b, and for each measurement: x ← x − c b, b ← b + e x with the x
+/// before it; in the end x ← p x.
 template <std::size_t M>
 struct ByMeasurements {
   static constexpr int kNumbers = 2 * static_cast<int>(M) + 1;
@@ -574,22 +553,9 @@ void see_through(ConstRowsView root, RowsView rows) {
 void take_measurements(RowsView root, RowsView rows, double* numbers, double* correction) {
   std::fill_n(correction, root.rows, 0.0);
   for (int first = 0; first < rows.rows; first += kMeasurementsAtOnce) {
-    const int rest = rows.rows - first;
-    const RowsView some{rows.row(first), rest, rows.columns, rows.stride};
-    switch (rest) {
-      case 1:
-        take_together<1>(root, some, numbers, correction);
-        break;
-      case 2:
-        take_together<2>(root, some, numbers, correction);
-        break;
-      case 3:
-        take_together<3>(root, some, numbers, correction);
-        break;
-      default:
-        take_together<4>(root, some, numbers, correction);
-        break;
-    }
+    const RowsView some{rows.row(first), rows.rows - first, rows.columns, rows.stride};
+    with_constant<kMeasurementsAtOnce>(
+        some.rows, [&](auto count) { take_together<decltype(count)::value>(root, some, numbers, correction); });
   }
 }
 

@@ -131,7 +131,7 @@ class StepsOfTwo {
  public:
   static constexpr int kMost = 64;
   /// The momenta turn by less in all steps together. What is left out is at most half of that, as a part of a
-  /// sensitivity, where one step is much longer than the others; a hundredth of it where steps are even.
+  /// sensitivity, where one step is much longer than the others; hundredths of it where steps are even, at 8 Hz.
   static constexpr double kMostTurn_rad = 1e-5;
 
   [[nodiscard]] bool empty() const { return steps_ == 0; }
@@ -205,6 +205,7 @@ void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::
     }
   }
 }
+
 /// Sensitivities of gyros, of which those that go in pairs are brought up to the present time only where settled.
 template <int Max, int N>
 class SensitivitiesOfAll {

@@ -207,13 +207,13 @@ class SquareRootCovariance {
   /// and columns from the last to the first; used up.
   void move(RowsView F, DynamicMatrix& noise) {
     const int d = F.rows;
-    const int of_one_momentum = d % 3 == 0 ? 3 : 2;  // whose states are others than those of another
+    const int of_one_momentum = d % 3 == 0 ? 3 : 2;  // rows with zeros in the same columns; two in the paper's filter
     const ConstRowsView S = std::as_const(*this).root();
     for (int i = 0; i < d; i += of_one_momentum) {
       see_through(S, {F.row(i), std::min(of_one_momentum, d - i), F.columns, F.stride});
     }
-    // F S S_Fᵀ and the noise, a triangle of their common square by rotations from the right: those of rows of the
-    // transpose, from the last to the first.
+    // The first columns of F S and the noise beside them become one triangle by rotations from the right. They are
+    // rotations of rows of the transpose, from the last to the first.
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic> moved(d, d);
     for (int i = 0; i < d; ++i) {
       for (int j = 0; j < d; ++j) {
