@@ -173,16 +173,11 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
   const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_, fix.covariance);
   if (!started_) {
     start(measurement);
-    started_ = true;
     report.status = FixStatus::kStarted;
     return report;
   }
-  ComparedRows<kMaxStates> rows(kMeasurements, kMaxStates + 1);
-  rows << measurement.H, measurement.innovation;
-  ComponentCovariance L = measurement.R;
-  whiten(L, rows_of(rows));
-
-  errors_.see_through_uncertainty(states_of(rows));
+  ComponentCovariance L;
+  ComparedRows<kMaxStates> rows = seen(measurement, L);
   report_innovation(measurement, rows, L, report);
   report.status = gate_.judge(setup_, report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
@@ -204,9 +199,7 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
       update_covariance_to_now(now);
-      rows.leftCols<kMaxStates>() = measurement.H;
-      solve_lower(matrix_of(L), states_of(rows));
-      errors_.see_through_uncertainty(states_of(rows));
+      rows = seen(measurement, L);
       report.weight = 1;
       break;
     default:
@@ -218,6 +211,16 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
   return report;
 }
 
+ComparedRows<PaperEstimator::kMaxStates> PaperEstimator::seen(const Measurement& measurement,
+                                                              ComponentCovariance& L) const {
+  ComparedRows<kMaxStates> rows(kMeasurements, kMaxStates + 1);
+  rows << measurement.H, measurement.innovation;
+  L = measurement.R;
+  whiten(L, rows_of(rows));
+  errors_.see_through_uncertainty(states_of(rows));
+  return rows;
+}
+
 void PaperEstimator::start(const Measurement& measurement) {
   Errors::DynamicByStates F = -measurement.H;
   F.leftCols<States::kDynamic>().setZero();
@@ -225,6 +228,7 @@ void PaperEstimator::start(const Measurement& measurement) {
   Errors::Vector correction = Errors::Vector::Zero(kMaxStates);
   correction.head<States::kDynamic>() = measurement.innovation;
   feed_back(correction);
+  started_ = true;
 }
 
 void PaperEstimator::feed_back(const Errors::Vector& correction) {

@@ -51,8 +51,8 @@ struct TurnOfTwo {
   Lanes3 m[3];  ///< columns of dt C_in_b
   Lanes3 turn;
 
-  [[gnu::always_inline]] inline TurnOfTwo(const PrecessingGyro& a, const PrecessingGyro& b,
-                                          const Eigen::Matrix3d& C_in_c, double dt_s, const Lanes3* given) {
+  [[gnu::always_inline]] TurnOfTwo(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c,
+                                   double dt_s, const Lanes3* given) {
     const Lanes3 h = corrected(a, b);
     // The columns of eq. (1) that are not zero.
     const Lanes sx = h.x * h.x, sy = h.y * h.y, sz = h.z * h.z;
@@ -89,7 +89,7 @@ struct TurnOfTwo {
 
   /// work(i, dt C_in_b times the column i of eq. (1)) for all of them.
   template <class Work>
-  [[gnu::always_inline]] inline void for_columns(const Work& work) const {
+  [[gnu::always_inline]] void for_columns(const Work& work) const {
     work(Esg7::kK0, k0.x * m[0] + k0.y * m[1] + k0.z * m[2]);
     work(Esg7::kMu12, x_mu12 * m[0] + y_mu12 * m[1]);
     work(Esg7::kMu23, y_mu23 * m[1] + z_mu23 * m[2]);
@@ -139,8 +139,8 @@ struct TurnOfTwo {
 /// The work of precess_two() by sums, inlined into functions for any processor and for AVX2, whose instructions have a
 /// place of their own for the result: the same bits with a fifth fewer.
 struct PrecessingTwo {
-  [[gnu::always_inline]] static inline bool step(const PrecessingGyro& a, const PrecessingGyro& b, StepsOfTwo& steps,
-                                                 const Eigen::Matrix3d& C_in_c, double dt_s) {
+  [[gnu::always_inline]] static bool step(const PrecessingGyro& a, const PrecessingGyro& b, StepsOfTwo& steps,
+                                          const Eigen::Matrix3d& C_in_c, double dt_s) {
     const TurnOfTwo its(a, b, C_in_c, dt_s, nullptr);
     const double* so_far = steps.at(StepsOfTwo::kTurn);
     const Lanes3 turn = Lanes3{load2(so_far), load2(so_far + 2), load2(so_far + 4)} + its.turn;

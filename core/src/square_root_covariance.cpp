@@ -38,6 +38,10 @@ template <class L>
 constexpr int width() {
   return static_cast<int>(sizeof(L) / sizeof(double));
 }
+template <>
+constexpr int width<double>() {
+  return 1;
+}
 
 /// Calls work(numbers, k) for all columns k from `first` on, as many at a time as L has numbers, the last ones fewer.
 /// `numbers` is of the type that holds as many.
@@ -123,7 +127,8 @@ template <class L>
     const RowsView some{extra.row(first), extra.rows - first, extra.columns, extra.stride};
     with_constant<kAtOnce>(
         some.rows, [&](auto rows) __attribute__((always_inline)) {
-          rotate_rows_into<L, decltype(rows)::value>(root, some, eliminated);
+          constexpr std::size_t kRows = decltype(rows)::value;
+          rotate_rows_into<L, kRows>(root, some, eliminated);
         });
   }
 }
@@ -226,8 +231,10 @@ template <class L>
   for (int first = 0; first < rows.rows; first += kAtOnce) {
     const RowsView some{rows.row(first), rows.rows - first, rows.columns, rows.stride};
     with_constant<kAtOnce>(
-        some.rows, [&](auto count)
-                       __attribute__((always_inline)) { see_through_together<L, decltype(count)::value>(root, some); });
+        some.rows, [&](auto count) __attribute__((always_inline)) {
+          constexpr std::size_t kRows = decltype(count)::value;
+          see_through_together<L, kRows>(root, some);
+        });
   }
 }
 
@@ -363,7 +370,7 @@ template <class L, std::size_t Vectors, std::size_t M>
 template <class L, std::size_t Rows>
 [[gnu::always_inline]] inline void add_products(const double* row, ConstRowsView others, double* products) {
   constexpr int kSums = 4;
-  constexpr std::size_t kVectors = static_cast<std::size_t>(kSums / width<L>());
+  constexpr auto kVectors = static_cast<std::size_t>(kSums / width<L>());
   L sums[Rows][kVectors] = {};
   const double* other[Rows];
   for (std::size_t i = 0; i < Rows; ++i) {
@@ -383,7 +390,7 @@ template <class L, std::size_t Rows>
     }
   }
   for (std::size_t i = 0; i < Rows; ++i) {
-    double sum[kSums];
+    double sum[kSums] = {};
     for (std::size_t v = 0; v < kVectors; ++v) {
       put(sums[i][v], sum + static_cast<int>(v) * width<L>());
     }
@@ -554,8 +561,10 @@ void take_measurements(RowsView root, RowsView rows, double* numbers, double* co
   std::fill_n(correction, root.rows, 0.0);
   for (int first = 0; first < rows.rows; first += kMeasurementsAtOnce) {
     const RowsView some{rows.row(first), rows.rows - first, rows.columns, rows.stride};
-    with_constant<kMeasurementsAtOnce>(
-        some.rows, [&](auto count) { take_together<decltype(count)::value>(root, some, numbers, correction); });
+    with_constant<kMeasurementsAtOnce>(some.rows, [&](auto count) {
+      constexpr std::size_t kRows = decltype(count)::value;
+      take_together<kRows>(root, some, numbers, correction);
+    });
   }
 }
 

@@ -144,6 +144,8 @@ class PaperEstimator {
   /// The momenta are those of the fix, all else is as before it.
   void start(const Measurement& measurement);
   void update_covariance_to_now(const QuasiInertial& now);
+  /// The measurement whitened, by the root L of its noise, and seen through the uncertainty, with what it shows.
+  [[nodiscard]] ComparedRows<kMaxStates> seen(const Measurement& measurement, ComponentCovariance& L) const;
   /// Innovation, its covariance and NIS; `seen`: the measurement whitened and seen through the uncertainty, L: the root
   /// of its noise.
   static void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& seen,

@@ -137,7 +137,7 @@ class StepsOfTwo {
   [[nodiscard]] bool empty() const { return steps_ == 0; }
   void clear() {
     steps_ = 0;
-    sums_.fill(0);
+    sums_ = {};
   }
   /// The sensitivities of one of the two over the steps; zero behind the columns of eq. (1).
   template <int Max>
@@ -164,14 +164,16 @@ class StepsOfTwo {
   static constexpr int kDrift = 4;
   static constexpr int kColumns = kDrift + Esg7::kSize;
 
-  /// A column of both: x, y, z, of each that of one gyro and then that of the other.
-  [[nodiscard]] double* at(int column) { return &sums_[static_cast<std::size_t>(6 * column)]; }
+  /// x, y, z, of each that of one gyro and then that of the other.
+  using Column = std::array<double, 6>;
+
+  [[nodiscard]] double* at(int column) { return sums_[static_cast<std::size_t>(column)].data(); }
   [[nodiscard]] Eigen::Vector3d column(int i, int which) const {
-    const double* its = &sums_[static_cast<std::size_t>(6 * i + which)];
+    const double* its = sums_[static_cast<std::size_t>(i)].data() + which;
     return {its[0], its[2], its[4]};
   }
 
-  std::array<double, 6 * kColumns> sums_{};
+  std::array<Column, kColumns> sums_{};
   int steps_ = 0;
 };
 
