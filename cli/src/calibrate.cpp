@@ -21,6 +21,7 @@
 #include "trihedron/ground/calibrate/several_passes.hpp"
 #include "trihedron/ground/evaluate/calibration_evaluation.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
@@ -73,21 +74,23 @@ void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& bel
   const Time epoch = outcome.run.calibration.epoch;
   const std::filesystem::path out = staged.path() / below;
   const io::MadeDirectory made(out);
-  io::write_calibration(out / kCalibrationFile, outcome.run.calibration);
-  const io::Mounting& mounting = outcome.pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
-  io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude, mounting);
-  if (outcome.run.definitive_attitude.size() > 0) {
-    io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude, mounting);
-  } else {
-    staged.drop(below / kDefinitiveFile);
-  }
-  io::write_file(out / kConfigFile, io::format_config(options));
-
   report::ReportInput input{outcome.pass.pass(), outcome.run, outcome.pass.truth_or_null(), {}, &outcome.evaluation};
   for (const io::Defect& defect : outcome.pass.loaded.defects) {
     input.telemetry_notes.push_back(defect.text());
   }
-  io::write_file(out / kReportFile, report::render(input));
+  ground::side_by_side(
+      [&] {
+        io::write_calibration(out / kCalibrationFile, outcome.run.calibration);
+        const io::Mounting& mounting = outcome.pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
+        io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude, mounting);
+        if (outcome.run.definitive_attitude.size() > 0) {
+          io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude, mounting);
+        } else {
+          staged.drop(below / kDefinitiveFile);
+        }
+        io::write_file(out / kConfigFile, io::format_config(options));
+      },
+      [&] { io::write_file(out / kReportFile, report::render(input)); });
   // After the report: the library keeps what it takes, and both together would be the most memory of all.
   give_back_memory();
   io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(outcome.run));

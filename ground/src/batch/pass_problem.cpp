@@ -67,8 +67,9 @@ bool turned_little(const Directions& from, const Directions& to, const GyroMask&
 }  // namespace
 
 /// Collects whitened rows of fixes of an arc; consecutive fixes closer than the setup says, between which the body has
-/// not turned by more than that, and with the same covariance, are replaced by their weighted mean. Rows about modes
-/// are made once for each mean.
+/// not turned by more than that, and with the same covariance, are replaced by their weighted mean. Between the first
+/// and the last of these how the momenta depend on the states of the arc is taken to be linear in time, so that the
+/// rows about states are made once for each mean, those about modes as well.
 class PassProblem::FixMerger {
  public:
   /// `beside`: columns of rows that are not about states; may be none.
@@ -78,41 +79,67 @@ class PassProblem::FixMerger {
   void add(const Moment& moment, const Rows& whitened, double weight) {
     const ScreenedPass::Fix& fix = *moment.fix;
     const PassSetup& setup = problem_.setup_;
-    turned_rad_ += sums_.empty() ? 0 : fix.rate_c.norm() * to_seconds(fix.fix.t - last_t_);
-    last_t_ = fix.fix.t;
+    turned_rad_ += sums_.empty() ? 0 : fix.rate_c.norm() * to_seconds(fix.fix.t - last_);
     const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= setup.fixes_together ||
                        turned_rad_ > setup.turn_together_rad || sums_.back().head != fix.fix.head ||
                        sums_.back().covariance != fix.fix.covariance.rad2 ||
                        !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
     turned_rad_ = first ? 0 : turned_rad_;
+    if (first) {
+      finish();
+    }
     Sum& sum = first ? sums_.emplace_back() : sums_.back();
     const double square = weight * weight;
-    const auto y = whitened.col(whitened.cols() - 1);
-    const Rows about_states = whitened.leftCols(whitened.cols() - 1);
+    const Index states = whitened.cols() - 1;
+    const auto y = whitened.col(states);
     square_ += square * y.squaredNorm();
     if (first) {
       sum.t = fix.fix.t;
       sum.head = fix.fix.head;
       sum.covariance = fix.fix.covariance.rad2;
       sum.used = fix.used;
-      sum.H.setZero(y.size(), problem_.without_modes_.size());
       sum.y.setZero(y.size());
       size_ += y.size();
+      now_.setZero(y.size(), states);
+      late_s_.setZero(y.size(), states);
+      take(moment, at_first_);
     }
+    last_ = fix.fix.t;
+    take(moment, at_last_);
     sum.weight += square;
     sum.y += square * y;
+    now_ += square * whitened.leftCols(states);
+    const double late_s = square * to_seconds(last_ - sum.t);
+    for (int k = 0; k < problem_.gyros_; ++k) {
+      const int at = problem_.on_board_.direction(k);
+      late_s_.middleCols<3>(at) += late_s * whitened.middleCols<3>(at);
+    }
     if (problem_.modes_) {
       const MovedByModes::Place at = problem_.moved_by_modes_.place(moment.arc, moment.t);
-      sum.add_moved(at.before, square * (1 - at.part), about_states, problem_.on_board_);
+      sum.add_moved(at.before, square * (1 - at.part), whitened, problem_.on_board_);
       if (at.part > 0) {
-        sum.add_moved(at.before + 1, square * at.part, about_states, problem_.on_board_);
+        sum.add_moved(at.before + 1, square * at.part, whitened, problem_.on_board_);
       }
     }
-    const MatrixXd by_states = problem_.by_states_but_modes(moment, about_states);
-    sum.H += square * by_states;
     if (beside_) {
+      const MatrixXd by_states = problem_.by_states_but_modes(moment, whitened.leftCols(states));
       const MatrixXd columns = square * beside_(moment, problem_.without_modes_, by_states);
       sum.beside = first ? columns : MatrixXd(sum.beside + columns);
+    }
+  }
+
+  /// Makes the rows about states of the last sum; to be called behind the last fix.
+  void finish() {
+    if (sums_.empty()) {
+      return;
+    }
+    MatrixXd& H = sums_.back().H;
+    if (const double span_s = to_seconds(last_ - sums_.back().t); span_s > 0) {
+      const Rows at_last = late_s_ / span_s;
+      now_ -= at_last;
+      H = problem_.by_states_but_modes(at_first_, now_) + problem_.by_states_but_modes(at_last_, at_last);
+    } else {
+      H = problem_.by_states_but_modes(at_first_, now_);
     }
   }
 
@@ -128,7 +155,8 @@ class PassProblem::FixMerger {
   }
 
   /// Writes the rows; returns the sum of squares about the means, which the rows do not contain.
-  [[nodiscard]] double put_into(std::size_t arc, SmootherStage& stage) const {
+  [[nodiscard]] double put_into(std::size_t arc, SmootherStage& stage) {
+    finish();
     stage.H.resize(size_, problem_.layout_.size());
     stage.y.resize(size_);
     Eigen::Index row = 0;
@@ -182,6 +210,7 @@ class PassProblem::FixMerger {
     VectorXd y;
     std::vector<Moved> moved;
 
+    /// `rows`: as on board.
     void add_moved(std::size_t number, double factor, const Rows& rows, const Layout& layout) {
       auto at = std::ranges::find(moved, number, &Moved::number);
       if (at == moved.end()) {
@@ -195,11 +224,27 @@ class PassProblem::FixMerger {
       }
     }
   };
+  /// Copies what the rows of the problem need.
+  void take(const ByStatesOfArc& from, ByStatesOfArc& to) const {
+    const int columns = problem_.on_board_.drift_columns();
+    for (int k = 0; k < problem_.gyros_; ++k) {
+      to.since[k].by_start = from.since[k].by_start;
+      to.since[k].by_drift.first(columns) = from.since[k].by_drift.first(columns);
+      to.since[k].by_alignment = from.since[k].by_alignment;
+      to.directions[k] = from.directions[k];
+    }
+  }
+
   const PassProblem& problem_;
   Beside beside_;
-  Time last_t_{};
   double turned_rad_ = 0;  ///< since the first of the last sum
   std::vector<Sum> sums_;
+  // Of the last sum:
+  Time last_{};
+  Rows now_;     ///< its rows about the states at each fix
+  Rows late_s_;  ///< those about directions, times how much later than the first each fix is
+  ByStatesOfArc at_first_;
+  ByStatesOfArc at_last_;
   Eigen::Index size_ = 0;
   double square_ = 0;
 };
@@ -362,15 +407,15 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   extra_variance_rad2 += largest_rad * largest_rad;
 }
 
-MatrixXd PassProblem::by_states_but_modes(const Moment& moment, Rows rows) const {
+MatrixXd PassProblem::by_states_but_modes(const ByStatesOfArc& momenta, Rows rows) const {
   const Layout& to = without_modes_;
   MatrixXd by_states(rows.rows(), to.size());
-  carry_back(on_board_, moment.since, rows);
+  carry_back(on_board_, momenta.since, rows);
   const int moving = to.drift(0) - to.wandering(0);
   by_states.middleCols(to.wandering(0), moving) = rows.middleCols(on_board_.wandering(0), moving);
   for (int k = 0; k < gyros_; ++k) {
     by_states.middleCols<2>(to.direction(k)) =
-        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moment.directions[k]);
+        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(momenta.directions[k]);
   }
   const int rest = to.size() - to.drift(0);
   by_states.rightCols(rest) = rows.middleCols(on_board_.drift(0), rest);
@@ -885,22 +930,25 @@ double PassProblem::add_arc(const PassSolution& solution, std::size_t arc, const
   return cost;
 }
 
-void PassProblem::for_each_arc(const PassSolution& solution, const Beside& beside,
-                               const std::function<void(std::size_t, const MatrixXd&)>& use) const {
+void PassProblem::for_each_arc(const PassSolution& solution, const std::vector<std::size_t>& begins,
+                               const Beside& beside,
+                               const std::function<void(std::size_t, std::size_t, const MatrixXd&)>& use) const {
   const double scale = scale_of_misfits(solution);
   const Drift drift = drift_along(solution, &sensitive());
-  Moment moment;
-  SmootherStage stage;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    double unused = 0;
-    FixMerger nearby(*this, beside);
-    static_cast<void>(add_arc(solution, arc, drift, scale, moment, unused, nearby));
-    static_cast<void>(nearby.put_into(arc, stage));
-    const MatrixXd columns = nearby.beside();
-    MatrixXd rows(stage.H.rows(), stage.H.cols() + columns.cols() + 1);
-    rows << stage.H, columns, stage.y;
-    use(arc, rows);
-  }
+  for_each_on_all_cores(begins.size() - 1, [&](std::size_t part) {
+    Moment moment;
+    SmootherStage stage;
+    for (std::size_t arc = begins[part]; arc < begins[part + 1]; ++arc) {
+      double unused = 0;
+      FixMerger nearby(*this, beside);
+      static_cast<void>(add_arc(solution, arc, drift, scale, moment, unused, nearby));
+      static_cast<void>(nearby.put_into(arc, stage));
+      const MatrixXd columns = nearby.beside();
+      MatrixXd rows(stage.H.rows(), stage.H.cols() + columns.cols() + 1);
+      rows << stage.H, columns, stage.y;
+      use(part, arc, rows);
+    }
+  });
 }
 
 double PassProblem::add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const {

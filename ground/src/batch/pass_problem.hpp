@@ -122,10 +122,12 @@ class PassProblem {
   /// without modes, and the rows about the states of the arc in that layout.
   struct Moment;
   using Beside = std::function<Eigen::MatrixXd(const Moment&, const Layout&, const Eigen::MatrixXd&)>;
-  /// The fixes of each arc in turn as the rows of linearise(), before these are reduced: columns about its states,
-  /// those `beside`, of which there is one at least, and the misfit. An arc without a fix has no rows, of any length.
-  void for_each_arc(const PassSolution& solution, const Beside& beside,
-                    const std::function<void(std::size_t, const Eigen::MatrixXd&)>& use) const;
+  /// The fixes of each arc as the rows of linearise(), before these are reduced: columns about its states, those
+  /// `beside`, of which there is one at least, and the misfit. An arc without a fix has no rows, of any length. Each
+  /// part of the pass begins at an arc of `begins`, of which the last is behind its end; its arcs are used in turn, but
+  /// the parts on all cores.
+  void for_each_arc(const PassSolution& solution, const std::vector<std::size_t>& begins, const Beside& beside,
+                    const std::function<void(std::size_t part, std::size_t arc, const Eigen::MatrixXd&)>& use) const;
   static constexpr std::size_t kParts = 6;
   /// The arc after the last one of that many parts.
   [[nodiscard]] std::size_t end_of(std::size_t parts) const { return parts * arcs_.size() / kParts; }
@@ -146,15 +148,18 @@ class PassProblem {
   /// Adds the corrections that smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
 
+  /// How the momenta of a time depend on the states of its arc.
+  struct ByStatesOfArc {
+    /// The beginning of the arc; by the coefficients of eq. (1) alone where modes stand for the others.
+    PerGyro<Sensitivity<kMaxDriftColumns>> since;
+    PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
+  };
   /// The state of the solution at one time of the pass, within an arc.
-  struct Moment {
+  struct Moment : ByStatesOfArc {
     std::size_t arc = 0;
     Time t{};
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
     Gyros gyros;  ///< estimates, with the momenta of this time and the wandering drift of the arc
-    /// The beginning of the arc; by the coefficients of eq. (1) alone where modes stand for the others.
-    PerGyro<Sensitivity<kMaxDriftColumns>> since;
-    PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
   /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
@@ -245,7 +250,7 @@ class PassProblem {
                     const std::function<void(const Moment&)>& visit) const;
   /// Rows about the states at a moment as rows about those of its arc but for the modes, in the order of
   /// without_modes_; and these put where they are among all states.
-  [[nodiscard]] Eigen::MatrixXd by_states_but_modes(const Moment& moment, Rows rows) const;
+  [[nodiscard]] Eigen::MatrixXd by_states_but_modes(const ByStatesOfArc& momenta, Rows rows) const;
   void put_beside_modes(const Eigen::MatrixXd& rows, Eigen::Ref<Eigen::MatrixXd> all) const;
   [[nodiscard]] const DriftModel& sensitive() const { return modes_ ? drift_of_eq1_ : drift_; }
   /// Coefficients outside eq. (1) as the states that stand for them, and back.

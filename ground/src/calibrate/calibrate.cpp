@@ -525,13 +525,25 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   const std::optional<Restamped> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
   const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
   const Pass& with_bursts = with_regular ? with_regular->pass : as_given;
-  const std::optional<WrongReadings> wrong = finds_noise ? wrong_for_a_moment(with_bursts) : std::nullopt;
-  const std::optional<Pass> rest = wrong ? without(*wrong, with_bursts) : std::nullopt;
+  std::optional<WrongReadings> wrong;
+  std::optional<Pass> rest;
+  std::optional<ReadoutNoise> noise;
+  std::optional<Clocks> clocks;  // of the readings as they are, which is right where nothing is wrong with them
+  side_by_side(
+      [&] {
+        if (finds_noise) {
+          wrong = wrong_for_a_moment(with_bursts);
+          rest = wrong ? without(*wrong, with_bursts) : std::nullopt;
+          noise = other_readout_noise(rest ? *rest : with_bursts);
+        }
+      },
+      [&] { clocks = clocks_of(with_bursts); });
   const Pass& in_time = rest ? *rest : with_bursts;
-  const std::optional<ReadoutNoise> noise = finds_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
-  std::optional<Clocks> clocks = clocks_of(as_stamped);
+  if (rest || noise) {
+    clocks = clocks_of(as_stamped);
+  }
   std::optional<Pass> without_step;
   const std::optional<ClockStep> step = clocks ? wanted_step(*clocks, as_stamped, options) : std::nullopt;
   if (step) {

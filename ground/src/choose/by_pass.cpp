@@ -524,10 +524,15 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   Settled settled = without_doubt(pass, screened, options, largest_model, wandering_is_open, free, progress);
   const bool wanders = settled.decision.options.further_states.is_on(FurtherState::kWanderingDrift);
   tell_what_is_open(wanders && free.wandering ? free.wandering->first : free.trial, options, settled.decision);
-  keep_field(settled.last, settled.decision);
-  settled.decision.nearby = settled.last.nearby();
-  settled.decision.use(moves_over(settled.last));
-  compare_with_drift(pass, screened, asked, settled.last, settled.more_noise, progress, settled.decision);
+  Moves moves;
+  side_by_side(
+      [&] {
+        keep_field(settled.last, settled.decision);
+        settled.decision.nearby = settled.last.nearby();
+        compare_with_drift(pass, screened, asked, settled.last, settled.more_noise, progress, settled.decision);
+      },
+      [&] { moves = moves_over(settled.last); });
+  settled.decision.use(std::move(moves));
   return std::move(settled.decision);
 }
 

@@ -10,6 +10,7 @@
 
 #include "choose/jumps.hpp"
 #include "choose/pass_form.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/stop.hpp"
 #include "trihedron/records/units.hpp"
 
@@ -354,21 +355,27 @@ Moves moves_over(const Trial& trial) {
   const auto [jumps, among] = jumps_over(trial);
   const PassForm pass(problem, found, jumps);
   ChangeSearch search(problem, found, pass);
-  for (int gyro = kAll; gyro < problem.layout().gyros; ++gyro) {
-    search.try_mounting(gyro);
-    search.try_coefficients(gyro);
-    search.try_steps(gyro);
-    for (std::size_t j = 0; j < jumps.size(); ++j) {
-      search.try_jump(gyro, jumps[j], j, among);
-    }
-  }
-  search.try_errors();
-  search.try_walks();
   const PolhodeSearch polhodes(pass, problem, kPolhodeOverChange * search.coefficient_sigma());
-  Moves moves{std::move(search).likeliest(), {}};
-  for (int k = 0; k < problem.layout().gyros; ++k) {
-    moves.polhodes[k] = polhodes.of_gyro(k);
-  }
+  Moves moves;
+  side_by_side(
+      [&] {
+        for (int gyro = kAll; gyro < problem.layout().gyros; ++gyro) {
+          search.try_mounting(gyro);
+          search.try_coefficients(gyro);
+          search.try_steps(gyro);
+          for (std::size_t j = 0; j < jumps.size(); ++j) {
+            search.try_jump(gyro, jumps[j], j, among);
+          }
+        }
+        search.try_errors();
+        search.try_walks();
+      },
+      [&] {
+        for (int k = 0; k < problem.layout().gyros; ++k) {
+          moves.polhodes[k] = polhodes.of_gyro(k);
+        }
+      });
+  moves.changes = std::move(search).likeliest();
   return moves;
 }
 

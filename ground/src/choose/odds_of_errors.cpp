@@ -60,12 +60,13 @@ MatrixXd information_on_shapes(const Trial& trial, Index shapes, const Beside& b
   const Index constants = problem.layout().size() - d;
   Stretch whole(d, constants, shapes);
   whole.measure(prior_rows(found.linear, shapes));
-  problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
+  const auto add = [&](std::size_t /*part*/, std::size_t arc, const MatrixXd& fixes) {
     whole.measure(fixes);
     if (arc + 1 < problem.arcs()) {
       whole.move(found.linear.stages[arc], MatrixXd(d, 0));
     }
-  });
+  };
+  problem.for_each_arc(found.before, {0, problem.arcs()}, beside, add);
   return without_first(without_states_at_end(whole.form(true), d), d + constants);
 }
 

@@ -218,21 +218,23 @@ PassForm::PassForm(const PassProblem& problem, const BatchResult& found, const s
     of_jumps.put(moment, layout, rows, columns.rightCols(of_jumps.size()));
     return columns;
   };
-  FormOfAll all(problem.layout(), static_cast<Index>(count), shapes);
-  Stretch stretch(moving, constants, shapes);
-  stretch.measure(prior_rows(found.linear, shapes));
-  std::size_t at = 0;
-  problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
-    stretch.measure(fixes);
+  std::vector<Stretch> parts(count, Stretch(moving, constants, shapes));
+  std::vector<MatrixXd> forms(count);
+  parts.front().measure(prior_rows(found.linear, shapes));
+  problem.for_each_arc(found.before, begins_, beside, [&](std::size_t part, std::size_t arc, const MatrixXd& fixes) {
+    parts[part].measure(fixes);
     const bool is_last = arc + 1 == problem.arcs();
     if (!is_last) {
-      stretch.move(found.linear.stages[arc], of_jumps.moved_in(arc));
+      parts[part].move(found.linear.stages[arc], of_jumps.moved_in(arc));
     }
-    if (arc + 1 == begins_[at + 1]) {
-      all.add(static_cast<Index>(at++), stretch.form(is_last));
-      stretch = Stretch(moving, constants, shapes);
+    if (arc + 1 == begins_[part + 1]) {
+      forms[part] = parts[part].form(is_last);
     }
   });
+  FormOfAll all(problem.layout(), static_cast<Index>(count), shapes);
+  for (std::size_t part = 0; part < count; ++part) {
+    all.add(static_cast<Index>(part), forms[part]);
+  }
   all.take_steps();
   form_ = all.eliminated(follow_);
   at_errors_ = steps() * of_stretch();

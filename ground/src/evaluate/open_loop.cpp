@@ -12,6 +12,7 @@
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/evaluate/open_loop_forecast.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
@@ -174,20 +175,20 @@ std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& ru
   if (scope == OpenLoopScope::kAll && run.attitude.size() > 0) {
     motion.emplace(run.attitude.t, run.attitude.q_in_c);
   }
-  std::vector<OpenLoops> all;
-  for (const Correction& correction : run.corrections) {
-    OpenLoops& loops = all.emplace_back();
-    if (scope == OpenLoopScope::kExtension && all.size() == 1) {
-      continue;
+  return on_all_cores(run.corrections.size(), [&](std::size_t i) {
+    OpenLoops loops;
+    if (scope == OpenLoopScope::kExtension && i == 0) {
+      return loops;
     }
+    const Correction& correction = run.corrections[i];
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
     if (motion && correction.errors.is_known()) {
       loops.predicted = predicted(correction, *motion, rule);
     }
     loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
-  }
-  return all;
+    return loops;
+  });
 }
 
 std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops) {
