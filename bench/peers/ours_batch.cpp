@@ -1,8 +1,10 @@
 // trihedron's batch over the same pass as the others: ours_batch PASS. The model is that of batch_model.hpp.
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <iterator>
 #include <limits>
 #include <variant>
 
@@ -18,7 +20,7 @@ using namespace trihedron;
 constexpr double kCoefficient_rad_s = 2e-6;
 constexpr double kAlignment_rad = 8.7e-3;
 
-/// All samples, and all fixes with the sample at their time.
+/// All samples, and all fixes with the sample at their time and the rate of the body there.
 ground::ScreenedPass all_of(const Pass& pass) {
   ground::ScreenedPass all(pass.gyro, 2);
   for (std::size_t i = 0; i < pass.gyro.t.size(); ++i) {
@@ -32,6 +34,11 @@ ground::ScreenedPass all_of(const Pass& pass) {
       its.fix = *fix;
       its.h_b = all.samples.h_b(sample);
       its.used = all_gyros(2);
+      if (all.fixes.size() > 1) {  // by the fixes alone
+        const StarFix& before = std::prev(all.fixes.end(), 2)->fix;
+        const Eigen::AngleAxisd turn(before.q_in_c.conjugate() * fix->q_in_c);
+        its.rate_c = turn.angle() / to_seconds(fix->t - before.t) * turn.axis();
+      }
     }
   }
   return all;
@@ -92,6 +99,7 @@ int main(int argc, char** argv) {
     ground::PassSetup setup = setup_of(walk_rad_sqrt_s);
     measure_and_print("trihedron, the batch", pass, setup);
     setup.fixes_together = Duration{0};
+    setup.long_step = setup.sample_step;  // as the model has it
     measure_and_print("trihedron, each fix by itself", pass, setup);
   }
 }

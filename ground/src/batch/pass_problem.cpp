@@ -52,16 +52,13 @@ Vector3d rate_of(const RotorDrift& rotor, const Gyro& gyro, const Vector3d& h, c
                                         : rate;
 }
 
-/// By how much a body may turn in a step of a table, rad.
-constexpr double kLittleTurn_rad = 0.01;
-
-/// Whether the readings of all gyros that are used at both ends have turned by little.
-bool turned_little(const Directions& from, const Directions& to, const GyroMask& used, int gyros) {
-  bool little = true;
+/// Whether the readings of all gyros that are used at both ends have turned by less than that.
+bool turned_less(const Directions& from, const Directions& to, const GyroMask& used, int gyros, double turn_rad) {
+  bool less = true;
   for (int k = 0; k < gyros; ++k) {
-    little = little && (!used[k] || (to[k] - from[k]).norm() < kLittleTurn_rad);
+    less = less && (!used[k] || (to[k] - from[k]).norm() < turn_rad);
   }
-  return little;
+  return less;
 }
 
 }  // namespace
@@ -278,6 +275,18 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
       taken = fix->fix.t;
     }
   };
+  const auto may_go_on = [&](std::size_t sample) {  // in the step that the last node begins
+    const Time t = samples_->t(sample);
+    if (t - taken < setup_.sample_step) {
+      return true;
+    }
+    if (t - taken >= setup_.long_step) {
+      return false;
+    }
+    const Reading from = reading_at(nodes_.back());
+    const GyroMask used = both(from.used, samples_->used(sample));
+    return turned_less(from.h_b, samples_->h_b(sample), used, gyros_, setup_.turn_in_long_step_rad);
+  };
   Time before = first;
   bool after_gap = false;
   for (std::size_t i = samples_->from(first + Duration{1}); i < samples_->size(); ++i) {
@@ -286,7 +295,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     after_gap = after_gap || t - before > setup_.on_board.max_interpolation();
     before = t;
     const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - t < setup_.sample_step / 2;
-    if (after_gap || (t - taken >= setup_.sample_step && !fix_follows) || i + 1 == samples_->size()) {
+    if (after_gap || i + 1 == samples_->size() || (!fix_follows && !may_go_on(i))) {
       nodes_.push_back({.t = t, .sample = i, .after_gap = std::exchange(after_gap, false)});
       taken = t;
     }
@@ -314,6 +323,7 @@ void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_
 void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
   moment.arc = arc;
   moment.t = nodes_[arcs_[arc].begin].t;
+  moment.read = reading_at(nodes_[arcs_[arc].begin]);
   moment.gyros = solution.gyros;
   for (int k = 0; k < gyros_; ++k) {
     moment.since[k].begin(drift_.columns());
@@ -339,16 +349,15 @@ PassProblem::Drift PassProblem::drift_along(const PassSolution& solution, const 
   return drift;
 }
 
-void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& drift, Moment& moment,
-                       double& extra_variance_rad2) const {
+void PassProblem::step(const Node& to_node, const Drift& drift, Moment& moment, double& extra_variance_rad2) const {
   const Layout& columns = setup_.on_board.layout;
-  const Duration dt = to_node.t - from_node.t;
+  const Duration dt = to_node.t - moment.t;
   const double dt_s = to_seconds(dt);
-  const Reading from = reading_at(from_node);
   const Reading to = reading_at(to_node);
-  DriftTimes times = setup_.on_board.drift_times(from_node.t + dt / 2);
+  const Reading from = std::exchange(moment.read, to);
+  DriftTimes times = setup_.on_board.drift_times(moment.t + dt / 2);
   for (DriftTime& time : times) {
-    time.part_of_change = setup_.on_board.change.mean_part(from_node.t, to_node.t);
+    time.part_of_change = setup_.on_board.change.mean_part(moment.t, to_node.t);
   }
   moment.t = to_node.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
@@ -465,6 +474,7 @@ VectorXd PassProblem::as_coefficients(int gyro, const VectorXd& states) const {
 MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) const {
   constexpr Duration kApart = std::chrono::seconds(10);     // over which the drift turns a momentum evenly
   constexpr Duration kTableStep = std::chrono::seconds(3);  // a third of that, unless the body turns fast
+  constexpr double kLittleTurn_rad = 0.01;
   const Drift drift = drift_along(solution, &drift_);
   MovedByModes table(arcs_.size());
   for_each_part([&](std::size_t begin, std::size_t end) {
@@ -476,17 +486,15 @@ MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) co
       const std::size_t last = std::min(arcs_[arc].end, nodes_.size() - 1);
       Time taken = moment.t - kApart;
       std::size_t from = arcs_[arc].begin;
-      Reading read = reading_at(nodes_[from]);
       for (std::size_t i = from; i <= last; ++i) {
         if (i > from) {
           const Reading next = i < last ? reading_at(nodes_[i + 1]) : Reading{};
           if (i < last && nodes_[i + 1].t - nodes_[from].t <= kTableStep &&
-              turned_little(read.h_b, next.h_b, both(read.used, next.used), gyros_)) {
+              turned_less(moment.read.h_b, next.h_b, both(moment.read.used, next.used), gyros_, kLittleTurn_rad)) {
             continue;
           }
-          step(nodes_[from], nodes_[i], drift, moment, unused);
+          step(nodes_[i], drift, moment, unused);
           from = i;
-          read = reading_at(nodes_[i]);
         }
         if (i == last || moment.t - taken >= kApart) {
           taken = moment.t;
@@ -568,7 +576,7 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
       Moment moment;
       begin_arc(solution, arc, moment);
       for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-        step(nodes_[i], nodes_[i + 1], drift, moment, unused);
+        step(nodes_[i + 1], drift, moment, unused);
       }
       h_in = momenta(moment.gyros, gyros_);
     }
@@ -624,7 +632,7 @@ void PassProblem::go_along_arc(const PassSolution& solution, std::size_t arc, co
   begin_arc(solution, arc, moment);
   for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
     if (i > arcs_[arc].begin) {
-      step(nodes_[i - 1], nodes_[i], drift, moment, unused);
+      step(nodes_[i], drift, moment, unused);
     }
     moment.fix = nodes_[i].fix;
     visit(moment);
@@ -841,7 +849,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
       std::size_t left = of_one_arc;
       for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {
         if (i > arcs_[arc].begin) {
-          step(nodes_[i - 1], nodes_[i], drift, moment, unused);
+          step(nodes_[i], drift, moment, unused);
         }
         moment.fix = nodes_[i].fix;
         Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
@@ -924,7 +932,7 @@ double PassProblem::add_arc(const PassSolution& solution, std::size_t arc, const
       cost += add_fix(compare_now(solution, moment), moment, scale, nearby);
     }
     if (i + 1 < nodes_.size()) {
-      step(nodes_[i], nodes_[i + 1], drift, moment, extra_variance_rad2);
+      step(nodes_[i + 1], drift, moment, extra_variance_rad2);
     }
   }
   return cost;

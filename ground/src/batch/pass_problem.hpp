@@ -31,8 +31,11 @@ struct PassSetup {
   CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
   Prior prior;
   /// Step of the prediction, up to half as long again before a fix; between the samples used the body turns little, and
-  /// their noise is averaged in the end.
+  /// their noise is averaged in the end. While it turns by no more than `turn_in_long_step_rad`, a step is up to
+  /// `long_step`: the midpoint rule loses a millionth of the drift.
   Duration sample_step = std::chrono::seconds(1);
+  Duration long_step = std::chrono::seconds(3);
+  double turn_in_long_step_rad = 0.005;
   /// Fixes closer in time than this, between which the body turns by no more than that, are merged into one; their
   /// differences are lost. Those of a degree hold 1e-5 of what the fixes tell: within it the rows change by a
   /// hundredth.
@@ -154,10 +157,15 @@ class PassProblem {
     PerGyro<Sensitivity<kMaxDriftColumns>> since;
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
+  struct Reading {
+    Directions h_b;
+    GyroMask used{};
+  };
   /// The state of the solution at one time of the pass, within an arc.
   struct Moment : ByStatesOfArc {
     std::size_t arc = 0;
     Time t{};
+    Reading read;
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
     Gyros gyros;  ///< estimates, with the momenta of this time and the wandering drift of the arc
   };
@@ -204,10 +212,6 @@ class PassProblem {
     std::size_t sample = 0;  ///< where there is no fix
     bool after_gap = false;
   };
-  struct Reading {
-    Directions h_b;
-    GyroMask used{};
-  };
   struct ArcNodes {
     std::size_t begin = 0;
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
@@ -242,8 +246,7 @@ class PassProblem {
   /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
-  void step(const Node& from_node, const Node& to_node, const Drift& drift, Moment& moment,
-            double& extra_variance_rad2) const;
+  void step(const Node& to_node, const Drift& drift, Moment& moment, double& extra_variance_rad2) const;
   /// `sensitive`: null where the momenta alone are wanted.
   [[nodiscard]] Drift drift_along(const PassSolution& solution, const DriftModel* sensitive) const;
   void go_along_arc(const PassSolution& solution, std::size_t arc, const Drift& drift,

@@ -320,7 +320,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
   const ScreenedSamples& samples = screened_.samples;
   for (std::size_t i = samples.from(from.t + Duration{1}); i < samples.size() && samples.t(i) <= to.t; ++i) {
     moment.t = samples.t(i);
-    // From node to node a momentum turns by a fraction of an arcsecond.
+    // From node to node a momentum turns evenly, by arcseconds at most.
     const double part = to_seconds(moment.t - from.t) / to_seconds(to.t - from.t);
     for (int k = 0; k < screened_.gyros; ++k) {
       moment.gyros[k].h_in = (from.gyros[k].h_in + part * (to.gyros[k].h_in - from.gyros[k].h_in)).normalized();

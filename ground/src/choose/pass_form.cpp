@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "choose/stretch.hpp"
@@ -148,10 +149,11 @@ class FormOfAll {
   }
 
   /// The form of the steps from the second stretch on, shapes and 1. `follow`: how the parameters of the first stretch
-  /// follow these, negated.
-  [[nodiscard]] MatrixXd eliminated(MatrixXd& follow) const {
+  /// follow these, negated. To be called last: the form is given up.
+  [[nodiscard]] MatrixXd eliminated(MatrixXd& follow) {
+    form_ = without_first(form_, at_others_);
     MatrixXd all_follow;
-    MatrixXd left = without_first(without_first(form_, at_others_), others() + of_stretch(), &all_follow);
+    MatrixXd left = without_first(form_, others() + of_stretch(), &all_follow);
     follow = all_follow.middleRows(others(), parameters_);
     return left;
   }
@@ -218,23 +220,29 @@ PassForm::PassForm(const PassProblem& problem, const BatchResult& found, const s
     of_jumps.put(moment, layout, rows, columns.rightCols(of_jumps.size()));
     return columns;
   };
+  FormOfAll all(problem.layout(), static_cast<Index>(count), shapes);
   std::vector<Stretch> parts(count, Stretch(moving, constants, shapes));
-  std::vector<MatrixXd> forms(count);
   parts.front().measure(prior_rows(found.linear, shapes));
+  std::vector<MatrixXd> forms(count);  // that wait for those before them: sums do not depend on the number of threads
+  std::size_t added = 0;
+  std::mutex one_at_a_time;
   problem.for_each_arc(found.before, begins_, beside, [&](std::size_t part, std::size_t arc, const MatrixXd& fixes) {
-    parts[part].measure(fixes);
+    Stretch& stretch = parts[part];
+    stretch.measure(fixes);
     const bool is_last = arc + 1 == problem.arcs();
     if (!is_last) {
-      parts[part].move(found.linear.stages[arc], of_jumps.moved_in(arc));
+      stretch.move(found.linear.stages[arc], of_jumps.moved_in(arc));
     }
     if (arc + 1 == begins_[part + 1]) {
-      forms[part] = parts[part].form(is_last);
+      MatrixXd form = stretch.form(is_last);
+      stretch = Stretch(moving, constants, shapes);
+      const std::scoped_lock lock(one_at_a_time);
+      forms[part] = std::move(form);
+      for (; added < count && forms[added].size() > 0; ++added) {
+        all.add(static_cast<Index>(added), std::exchange(forms[added], MatrixXd()));
+      }
     }
   });
-  FormOfAll all(problem.layout(), static_cast<Index>(count), shapes);
-  for (std::size_t part = 0; part < count; ++part) {
-    all.add(static_cast<Index>(part), forms[part]);
-  }
   all.take_steps();
   form_ = all.eliminated(follow_);
   at_errors_ = steps() * of_stretch();

@@ -87,7 +87,8 @@ MatrixXd without_first(const MatrixXd& form, Index size, MatrixXd* follow) {
   }
   MatrixXd left = form.bottomRightCorner(rest, rest);
   add_gram(half.transpose(), -1, left);
-  return left.selfadjointView<Eigen::Lower>();
+  left.triangularView<Eigen::StrictlyUpper>() = left.transpose();
+  return left;
 }
 
 MatrixXd without_states_at_end(const MatrixXd& form, Index states) {

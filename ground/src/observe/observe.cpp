@@ -257,7 +257,9 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   if (screened.pass.fixes.empty()) {
     throw nothing_used(screen(pass, options, true).run->recorder.run().fixes);
   }
-  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
+  PassSetup setup = pass_setup(pass.settings, options);
+  setup.long_step = setup.sample_step;  // what the angles between the momenta tell is that of samples between fixes
+  const PassProblem problem(screened.pass, std::move(setup));
   const BatchResult found = most_likely(problem, first_solution(problem, screened));
   const Layout& layout = problem.layout();
   const Linearised at{problem, found, found.linear.prior.bottomRightCorner(layout.constants(), layout.constants())};

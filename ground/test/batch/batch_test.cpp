@@ -627,13 +627,20 @@ TEST(PassProblem, LosesLittleByFixesTakenTogether) {
   EXPECT_LT((together_y - apart_y).norm(), 0.02 * apart_y.norm());
 }
 
-/// The flight code's sensitivities, themselves tested against differences, over steps of 125 ms instead of a second.
+struct StepsOfBatch {
+  Duration longest;
+  double times_drift;  ///< by which momenta turn as much in a step
+};
+class ProblemWithSteps : public testing::TestWithParam<StepsOfBatch> {};
+
+/// The flight code's sensitivities, themselves tested against differences, over steps of 125 ms instead of seconds.
 /// Half a step behind it would be off by 5e-4 of what the momenta turn.
-TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
+TEST_P(ProblemWithSteps, CarriesErrorsAlongAsTheFlightCodeDoes) {
   const ScreenedPass screened = screened_beginning(two_hours(), 8 * 55);
   PassSetup setup = full_setup(two_hours());
+  setup.long_step = GetParam().longest;
   for (Gyro& gyro : setup.prior.gyros) {
-    gyro.drift_rad_s *= 1000;  // momenta turn by degrees
+    gyro.drift_rad_s *= GetParam().times_drift;  // momenta turn by a degree and more
   }
   const PassProblem problem(screened, setup);
   const PassSolution solution = problem.start(setup.prior.gyros);
@@ -674,6 +681,9 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
   });
   EXPECT_GT(since[0].by_alignment.norm(), 0.01);
 }
+INSTANTIATE_TEST_SUITE_P(Steps, ProblemWithSteps,
+                         testing::Values(StepsOfBatch{std::chrono::seconds(1), 1000},
+                                         StepsOfBatch{std::chrono::seconds(3), 333}));
 
 }  // namespace
 }  // namespace trihedron::ground

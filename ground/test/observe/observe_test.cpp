@@ -143,6 +143,7 @@ TEST(Observability, GainsByTheAngleWhatTurnsTheMomentaTowardsEachOther) {
   EXPECT_GT(observability.angle_gain.minCoeff(), 1);
   EXPECT_LT(observability.angle_gain.minCoeff(), 1.05);
   EXPECT_GT(observability.angle_gain.maxCoeff(), 1.5);
+  EXPECT_GT(in_steady_flight().angle_gain.maxCoeff(), 1.5);
 }
 
 /// In steady flight an alignment error of all gyros about the orbit normal does no harm until the satellite rolls by r:
