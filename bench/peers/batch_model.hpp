@@ -22,11 +22,12 @@ using Mat3 = Eigen::Matrix<T, 3, 3>;
 struct Node {
   double t_s;
   Vector3d h_b[2];
+  std::size_t sample;
   const Fix* fix;
 };
 /// From a node to the next; what does not depend on the estimates.
 struct Step {
-  Vector3d middle_b[2];                       ///< readings in its middle
+  Vector3d middle_b[2];                       ///< readings, their mean over it
   Eigen::Matrix<double, 3, 7> dt_basis_b[2];  ///< B of eq. (1) there, times its length
 };
 /// Nodes from `begin`; `end` is the first of the next arc, or the last of the pass.
@@ -47,18 +48,20 @@ inline Course course_of(const Pass& pass, double arc_s) {
   Course course;
   std::vector<Node>& nodes = course.nodes;
   auto fix = pass.fixes.begin();
-  for (const Sample& sample : pass.samples) {
+  for (std::size_t i = 0; i < pass.samples.size(); ++i) {
+    const Sample& sample = pass.samples[i];
     const Fix* here = fix != pass.fixes.end() && fix->t_s <= sample.t_s ? &*fix++ : nullptr;
     const bool fix_follows = fix != pass.fixes.end() && fix->t_s - sample.t_s < 0.5;
     const bool far = !nodes.empty() && sample.t_s - nodes.back().t_s > 1 - kStamp_s && !fix_follows;
     if (here != nullptr || far) {
-      nodes.push_back({sample.t_s, {sample.h_b[0], sample.h_b[1]}, here});
+      nodes.push_back({sample.t_s, {sample.h_b[0], sample.h_b[1]}, i, here});
     }
   }
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
     Step& step = course.steps.emplace_back();
-    for (int k = 0; k < 2; ++k) {
-      step.middle_b[k] = (nodes[i].h_b[k] + nodes[i + 1].h_b[k]).normalized();
+    const Sample& middle = pass.samples[(nodes[i].sample + nodes[i + 1].sample) / 2];
+    for (int k = 0; k < 2; ++k) {  // Simpson's rule
+      step.middle_b[k] = (nodes[i].h_b[k] + 4 * middle.h_b[k] + nodes[i + 1].h_b[k]).normalized();
       step.dt_basis_b[k] = (nodes[i + 1].t_s - nodes[i].t_s) * drift_basis(step.middle_b[k]);
     }
   }

@@ -125,21 +125,6 @@ class PassProblem::FixMerger {
     }
   }
 
-  /// Makes the rows about states of the last sum; to be called behind the last fix.
-  void finish() {
-    if (sums_.empty()) {
-      return;
-    }
-    MatrixXd& H = sums_.back().H;
-    if (const double span_s = to_seconds(last_ - sums_.back().t); span_s > 0) {
-      const Rows at_last = late_s_ / span_s;
-      now_ -= at_last;
-      H = problem_.by_states_but_modes(at_first_, now_) + problem_.by_states_but_modes(at_last_, at_last);
-    } else {
-      H = problem_.by_states_but_modes(at_first_, now_);
-    }
-  }
-
   /// The columns beside the rows that put_into() writes.
   [[nodiscard]] MatrixXd beside() const {
     MatrixXd columns(size_, sums_.empty() ? 0 : sums_.front().beside.cols());
@@ -170,6 +155,21 @@ class PassProblem::FixMerger {
   }
 
  private:
+  /// Makes the rows about states of the last sum, once it is complete.
+  void finish() {
+    if (sums_.empty()) {
+      return;
+    }
+    MatrixXd& H = sums_.back().H;
+    if (const double span_s = to_seconds(last_ - sums_.back().t); span_s > 0) {
+      const Rows at_last = late_s_ / span_s;
+      now_ -= at_last;
+      H = problem_.by_states_but_modes(at_first_, now_) + problem_.by_states_but_modes(at_last_, at_last);
+    } else {
+      H = problem_.by_states_but_modes(at_first_, now_);
+    }
+  }
+
   /// All rows about how far a momentum has moved at the moments of the table, times how far the modes move it there.
   void put_modes_into(std::size_t arc, int gyro, MatrixXd& H) const {
     const auto moments = static_cast<Eigen::Index>(problem_.moved_by_modes_.size(arc));
@@ -275,17 +275,25 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
       taken = fix->fix.t;
     }
   };
-  const auto may_go_on = [&](std::size_t sample) {  // in the step that the last node begins
-    const Time t = samples_->t(sample);
-    if (t - taken < setup_.sample_step) {
+  const auto ends_step = [&](std::size_t sample) {  // that the last node begins
+    if (sample + 1 == samples_->size()) {
       return true;
     }
-    if (t - taken >= setup_.long_step) {
+    const Time t = samples_->t(sample);
+    const Time next = samples_->t(sample + 1);
+    if (next - t > setup_.on_board.max_interpolation()) {
+      return true;
+    }
+    if (next - taken <= setup_.sample_step || (fix != pass.fixes.end() && fix->fix.t - t < setup_.sample_step / 2)) {
       return false;
     }
+    if (next - taken > setup_.long_step) {
+      return true;
+    }
     const Reading from = reading_at(nodes_.back());
-    const GyroMask used = both(from.used, samples_->used(sample));
-    return turned_less(from.h_b, samples_->h_b(sample), used, gyros_, setup_.turn_in_long_step_rad);
+    const GyroMask used = both(from.used, samples_->used(sample + 1));
+    return count(used) < 2 ||
+           !turned_less(from.h_b, samples_->h_b(sample + 1), used, gyros_, setup_.turn_in_long_step_rad);
   };
   Time before = first;
   bool after_gap = false;
@@ -294,13 +302,13 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     add_fixes_until(t - Duration{1});  // on its own time after it
     after_gap = after_gap || t - before > setup_.on_board.max_interpolation();
     before = t;
-    const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - t < setup_.sample_step / 2;
-    if (after_gap || i + 1 == samples_->size() || (!fix_follows && !may_go_on(i))) {
+    if (after_gap || ends_step(i)) {
       nodes_.push_back({.t = t, .sample = i, .after_gap = std::exchange(after_gap, false)});
       taken = t;
     }
   }
   add_fixes_until(Time::max());
+  find_middles();
   // The coefficients are those of the end of the pass; their change is that over the whole pass.
   setup_.on_board.change.zero_at = nodes_.back().t;
   setup_.on_board.change.duration_s = to_seconds(nodes_.back().t - nodes_.front().t);
@@ -310,6 +318,42 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     }
     arcs_.back().end = i + 1;
   }
+}
+
+void PassProblem::find_middles() {
+  std::size_t sample = 0;
+  for (std::size_t i = 1; i < nodes_.size(); ++i) {
+    const Time begin = nodes_[i - 1].t;
+    const Time middle = begin + (nodes_[i].t - begin) / 2;
+    const auto off = [&](std::size_t its) { return std::chrono::abs(samples_->t(its) - middle); };
+    while (sample + 1 < samples_->size() && off(sample + 1) <= off(sample)) {
+      ++sample;
+    }
+    if (!nodes_[i].after_gap && samples_->t(sample) > begin && samples_->t(sample) < nodes_[i].t) {
+      nodes_[i].middle = sample;
+    }
+  }
+}
+
+Directions PassProblem::mean_reading(Time begin, const Reading& from, const Node& to_node, const Reading& to) const {
+  constexpr double kNearMiddle = 0.2;
+  const Duration dt = to_node.t - begin;
+  const double part =
+      to_node.middle ? to_seconds(samples_->t(*to_node.middle) - begin) / to_seconds(dt) : 0;  // of the step before it
+  const bool has_middle = std::abs(part - 0.5) < kNearMiddle;
+  const Reading middle =
+      has_middle ? Reading{samples_->h_b(*to_node.middle), samples_->used(*to_node.middle)} : Reading{};
+  Directions mean = unread();
+  for (int k = 0; k < gyros_; ++k) {
+    if (has_middle && middle.used[k]) {  // the integral of a parabola
+      mean[k] = ((0.5 - 1 / (6 * part)) * from.h_b[k] + 1 / (6 * part * (1 - part)) * middle.h_b[k] +
+                 (0.5 - 1 / (6 * (1 - part))) * to.h_b[k])
+                    .normalized();
+    } else {
+      mean[k] = (from.h_b[k] + to.h_b[k]).normalized();
+    }
+  }
+  return mean;
 }
 
 void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_t)>& work) const {
@@ -355,6 +399,7 @@ void PassProblem::step(const Node& to_node, const Drift& drift, Moment& moment, 
   const double dt_s = to_seconds(dt);
   const Reading to = reading_at(to_node);
   const Reading from = std::exchange(moment.read, to);
+  Directions middle = mean_reading(moment.t, from, to_node, to);
   DriftTimes times = setup_.on_board.drift_times(moment.t + dt / 2);
   for (DriftTime& time : times) {
     time.part_of_change = setup_.on_board.change.mean_part(moment.t, to_node.t);
@@ -363,9 +408,8 @@ void PassProblem::step(const Node& to_node, const Drift& drift, Moment& moment, 
   // Gyros that can be used at both ends; where those are too few, at its end.
   const GyroMask at_both = both(from.used, to.used);
   const GyroMask used = count(at_both) >= 2 ? at_both : to.used;
-  Directions middle;
   for (int k = 0; k < gyros_; ++k) {
-    middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
+    middle[k] = at_both[k] ? middle[k] : used[k] ? to.h_b[k] : Vector3d::UnitX();
   }
   Directions omega_b = {};
   for (int k = 0; k < gyros_; ++k) {

@@ -30,9 +30,9 @@ struct ProcessNoise {
 struct PassSetup {
   CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
   Prior prior;
-  /// Step of the prediction, up to half as long again before a fix; between the samples used the body turns little, and
-  /// their noise is averaged in the end. While it turns by no more than `turn_in_long_step_rad`, a step is up to
-  /// `long_step`: the midpoint rule loses a millionth of the drift.
+  /// The most that a step of the prediction takes, or one sample, and half of that more before a fix; between the
+  /// samples used the body turns little, and their noise is averaged in the end. While it turns by no more than
+  /// `turn_in_long_step_rad`, the most is `long_step`: the midpoint rule loses a millionth of the drift.
   Duration sample_step = std::chrono::seconds(1);
   Duration long_step = std::chrono::seconds(3);
   double turn_in_long_step_rad = 0.005;
@@ -211,6 +211,7 @@ class PassProblem {
     const ScreenedPass::Fix* fix = nullptr;
     std::size_t sample = 0;  ///< where there is no fix
     bool after_gap = false;
+    std::optional<std::size_t> middle = {};  ///< the sample nearest to the middle of the step that ends here
   };
   struct ArcNodes {
     std::size_t begin = 0;
@@ -246,6 +247,10 @@ class PassProblem {
   /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
+  void find_middles();
+  /// The mean over a step, of gyros that can be used at both ends. With the reading in its middle, without which it is
+  /// off by a twelfth of the square of the time while the body accelerates.
+  [[nodiscard]] Directions mean_reading(Time begin, const Reading& from, const Node& to_node, const Reading& to) const;
   void step(const Node& to_node, const Drift& drift, Moment& moment, double& extra_variance_rad2) const;
   /// `sensitive`: null where the momenta alone are wanted.
   [[nodiscard]] Drift drift_along(const PassSolution& solution, const DriftModel* sensitive) const;

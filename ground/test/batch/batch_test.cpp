@@ -205,6 +205,23 @@ TEST(Batch, GivesTheAttitudeAtEachSample) {
   EXPECT_LT(std::sqrt(square), 0.5 * kArcsecond);
 }
 
+/// The last sample before a gap is not at the end of a step of a second. Behind the gap nothing is known of it.
+TEST(Batch, GivesTheAttitudeAtTheLastSampleBeforeAGap) {
+  constexpr double kBegin_s = 5 * 60 + 2.9;
+  Scenario scenario = scenario_in_eq1(5, std::chrono::minutes(50));
+  scenario.attitude.slews = std::vector<Slew>{};
+  scenario.gyro_gaps = {{kBegin_s, 35 * 60}};
+  scenario.star_tracker.outages = {{kBegin_s - 25, 34 * 60}};
+  const auto [pass, truth, events] = sim::simulate(scenario);
+  CalibrationOptions options = batch();
+  options.definitive_attitude = true;
+  const AttitudeHistory attitude = calibrate(pass, options).definitive_attitude;
+  const auto last = static_cast<std::size_t>(
+      std::ranges::lower_bound(attitude.t, pass.settings.epoch + from_seconds(kBegin_s)) - attitude.t.begin() - 1);
+  ASSERT_GT(to_seconds(attitude.t[last + 1] - attitude.t[last]), 29 * 60);
+  EXPECT_LT(attitude.sigma_rad[last].norm(), 1.3 * attitude.sigma_rad[last - 8].norm());
+}
+
 TEST(Batch, TakesADriftFieldOfAPassOfMinutes) {
   CalibrationOptions options;
   options.estimator = Estimator::kBatch;
@@ -681,6 +698,46 @@ TEST_P(ProblemWithSteps, CarriesErrorsAlongAsTheFlightCodeDoes) {
   });
   EXPECT_GT(since[0].by_alignment.norm(), 0.01);
 }
+
+/// A slew begins and ends with long steps, in which the mean of two readings is off by 3e-4.
+TEST(PassProblem, TurnsTheMomentaWhileTheBodyAcceleratesAsTheFlightCodeDoes) {
+  Scenario scenario = scenario_in_eq1(5, std::chrono::minutes(1));
+  scenario.attitude.jitter_rad = 0;
+  scenario.attitude.slews = std::vector<Slew>{{.begin_s = 10.1, .roll_rad = 0.1}};
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = 0;
+  }
+  const auto simulated = sim::simulate(scenario);
+  const ScreenedPass screened = screened_beginning(simulated, 8 * 55);
+  PassSetup setup = full_setup(simulated);
+  for (Gyro& gyro : setup.prior.gyros) {
+    gyro.drift_rad_s *= 10;
+  }
+  const PassProblem problem(screened, setup);
+  const PassSolution solution = problem.start(setup.prior.gyros);
+  const DriftModel drift(problem.layout().drift_model, problem.layout().further);
+  Gyros gyros = setup.prior.gyros;
+  for (int k = 0; k < 2; ++k) {
+    gyros[k].h_in = solution.arcs[0].h_in[k];
+  }
+  for (std::size_t i = 0; i + 1 < screened.samples.size(); ++i) {
+    const ScreenedSamples::Sample from = screened.samples[i];
+    const ScreenedSamples::Sample to = screened.samples[i + 1];
+    const DriftTimes times = problem.setup().on_board.drift_times(from.t + (to.t - from.t) / 2);
+    Directions middle;
+    for (int k = 0; k < 2; ++k) {
+      middle[k] = (from.h_b[k] + to.h_b[k]).normalized();
+    }
+    const Eigen::Matrix3d C_in_c =
+        optimal_rotation(momenta(gyros, 2), in_c(gyros, 2, middle), all_gyros(2)).value().raw();
+    precess_all(
+        gyros, 2, drift, C_in_c, middle, [&] { return times; }, to_seconds(to.t - from.t));
+  }
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_LT((problem.last_moment(solution).gyros[k].h_in - gyros[k].h_in).norm(), 2e-9);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Steps, ProblemWithSteps,
                          testing::Values(StepsOfBatch{std::chrono::seconds(1), 1000},
                                          StepsOfBatch{std::chrono::seconds(3), 333}));
