@@ -72,6 +72,14 @@ class PassProblem::FixMerger {
   /// `beside`: columns of rows that are not about states; may be none.
   explicit FixMerger(const PassProblem& problem, Beside beside = {}) : problem_(problem), beside_(std::move(beside)) {}
 
+  /// For another arc.
+  void clear() {
+    sums_.clear();
+    turned_rad_ = 0;
+    size_ = 0;
+    square_ = 0;
+  }
+
   /// `whitened`: rows as on board, right side last.
   void add(const Moment& moment, const Rows& whitened, double weight) {
     const ScreenedPass::Fix& fix = *moment.fix;
@@ -931,9 +939,10 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
   for_each_part([&](std::size_t begin, std::size_t end) {
     ConstantSquares constants(by_parts ? layout_.constants() + 1 : 0);
     Moment moment;
+    FixMerger nearby(*this);
     for (std::size_t arc = begin; arc < end; ++arc) {
       double extra_variance_rad2 = 0;
-      FixMerger nearby(*this);
+      nearby.clear();
       outside_rows[arc] = add_arc(solution, arc, drift, scale, moment, extra_variance_rad2, nearby);
       SmootherStage& stage = linear.stages[arc];
       outside_rows[arc] += nearby.put_into(arc, stage);
@@ -990,9 +999,10 @@ void PassProblem::for_each_arc(const PassSolution& solution, const std::vector<s
   for_each_on_all_cores(begins.size() - 1, [&](std::size_t part) {
     Moment moment;
     SmootherStage stage;
+    FixMerger nearby(*this, beside);
     for (std::size_t arc = begins[part]; arc < begins[part + 1]; ++arc) {
       double unused = 0;
-      FixMerger nearby(*this, beside);
+      nearby.clear();
       static_cast<void>(add_arc(solution, arc, drift, scale, moment, unused, nearby));
       static_cast<void>(nearby.put_into(arc, stage));
       const MatrixXd columns = nearby.beside();
