@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,9 @@ struct Pass {
 
 inline std::vector<std::vector<double>> read_csv(const std::string& path) {
   std::ifstream file(path);
+  if (!file) {
+    throw std::runtime_error(path + " cannot be read");
+  }
   std::vector<std::vector<double>> rows;
   std::string line;
   std::getline(file, line);
