@@ -248,8 +248,9 @@ class PassProblem {
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
   void find_middles();
-  /// The mean over a step, of gyros that can be used at both ends. With the reading in its middle, without which it is
-  /// off by a twelfth of the square of the time while the body accelerates.
+  /// The mean over a step of T seconds, of gyros that can be used at both ends. The mean of the readings at its ends
+  /// alone is off by a T²/12 while the body accelerates by a; that of the parabola through them and the one in the
+  /// middle is not.
   [[nodiscard]] Directions mean_reading(Time begin, const Reading& from, const Node& to_node, const Reading& to) const;
   void step(const Node& to_node, const Drift& drift, Moment& moment, double& extra_variance_rad2) const;
   /// `sensitive`: null where the momenta alone are wanted.
