@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -54,10 +55,6 @@ struct Outcome {
   ground::CalibrationEvaluation evaluation;
 };
 
-Outcome outcome_of(const io::NamedPass& pass, const CalibrationRun& run) {
-  return {pass, run, ground::evaluate_calibration(pass.pass(), run, pass.truth_or_null())};
-}
-
 // Names of the files of an outcome.
 constexpr std::string_view kCalibrationFile = "calibration.json";
 constexpr std::string_view kAttitudeFile = "attitude.csv";
@@ -68,32 +65,46 @@ constexpr std::string_view kReportFile = "report.html";
 constexpr std::array kOutcomeFiles = {kCalibrationFile, kAttitudeFile, kDefinitiveFile,
                                       kResidualsFile,   kConfigFile,   kReportFile};
 
-/// `below`: the directory in OUT.
-void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& below, const Outcome& outcome,
-                   const CalibrationOptions& options) {
-  const Time epoch = outcome.run.calibration.epoch;
+/// `below`: the directory in OUT. evaluate() is called beside the writing of what does not depend on it; returns what
+/// it gives.
+ground::CalibrationEvaluation stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& below,
+                                            const io::NamedPass& pass, const CalibrationRun& run,
+                                            const CalibrationOptions& options,
+                                            const std::function<ground::CalibrationEvaluation()>& evaluate) {
+  const Time epoch = run.calibration.epoch;
   const std::filesystem::path out = staged.path() / below;
   const io::MadeDirectory made(out);
-  report::ReportInput input{outcome.pass.pass(), outcome.run, outcome.pass.truth_or_null(), {}, &outcome.evaluation};
-  for (const io::Defect& defect : outcome.pass.loaded.defects) {
-    input.telemetry_notes.push_back(defect.text());
-  }
+  ground::CalibrationEvaluation evaluation;
   ground::side_by_side(
       [&] {
-        io::write_calibration(out / kCalibrationFile, outcome.run.calibration);
-        const io::Mounting& mounting = outcome.pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
-        io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude, mounting);
-        if (outcome.run.definitive_attitude.size() > 0) {
-          io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude, mounting);
+        evaluation = evaluate();
+        report::ReportInput input{pass.pass(), run, pass.truth_or_null(), {}, &evaluation};
+        for (const io::Defect& defect : pass.loaded.defects) {
+          input.telemetry_notes.push_back(defect.text());
+        }
+        io::write_file(out / kReportFile, report::render(input));
+      },
+      [&] {
+        io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(run));
+        io::write_calibration(out / kCalibrationFile, run.calibration);
+        const io::Mounting& mounting = pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
+        io::write_attitude(out / kAttitudeFile, epoch, run.attitude, mounting);
+        if (run.definitive_attitude.size() > 0) {
+          io::write_attitude(out / kDefinitiveFile, epoch, run.definitive_attitude, mounting);
         } else {
           staged.drop(below / kDefinitiveFile);
         }
         io::write_file(out / kConfigFile, io::format_config(options));
-      },
-      [&] { io::write_file(out / kReportFile, report::render(input)); });
-  // After the report: the library keeps what it takes, and both together would be the most memory of all.
-  give_back_memory();
-  io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(outcome.run));
+      });
+  return evaluation;
+}
+
+/// The same, evaluated by the truth or the fixes of the pass.
+Outcome stage_evaluated(io::StagedDirectory& staged, const std::filesystem::path& below, const io::NamedPass& pass,
+                        const CalibrationRun& run, const CalibrationOptions& options) {
+  return {pass, run, stage_outcome(staged, below, pass, run, options, [&] {
+            return ground::evaluate_calibration(pass.pass(), run, pass.truth_or_null());
+          })};
 }
 
 nlohmann::ordered_json counts_json(const std::vector<NamedCount>& counts) {
@@ -191,7 +202,7 @@ std::vector<std::string> estimator_names() {
 
 void stage_calibration(io::StagedDirectory& staged, const io::NamedPass& pass, const CalibrationRun& run,
                        ground::CalibrationEvaluation evaluation, const CalibrationOptions& options) {
-  stage_outcome(staged, {}, {pass, run, std::move(evaluation)}, options);
+  static_cast<void>(stage_outcome(staged, {}, pass, run, options, [&] { return std::move(evaluation); }));
 }
 
 Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
@@ -200,10 +211,9 @@ Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::pa
   const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common);
   const bool several = passes.size() > 1;
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
-    stage_outcome(staged, passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
+    static_cast<void>(stage_evaluated(staged, passes[i].name, passes[i], calibrated.passes()[i].run, options));
   }
-  const Outcome outcome = outcome_of(passes.back(), calibrated.combined());
-  stage_outcome(staged, {}, outcome, options);
+  const Outcome outcome = stage_evaluated(staged, {}, passes.back(), calibrated.combined(), options);
 
   if (several) {
     common.log.say("of all passes together:");

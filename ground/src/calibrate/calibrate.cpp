@@ -18,9 +18,9 @@
 #include "calibrate/bursts.hpp"
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
+#include "calibrate/corrected_pass.hpp"
 #include "calibrate/correlated_fixes.hpp"
 #include "calibrate/readout_noise.hpp"
-#include "calibrate/restarted_gyro.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
@@ -202,77 +202,6 @@ void put_misfit_into(NavigationRun& run, const Pipeline& pipeline) {
   }
 }
 
-/// What is corrected before the calibration: what is switched off is not.
-ClockCorrection wanted_correction(const Clocks& clocks, const PassSettings& settings,
-                                  const CalibrationOptions& options) {
-  ClockCorrection correction = correction_by(clocks, settings);
-  if (options.further_states[FurtherState::kClockOffset] == FurtherStateOptions::Choice::kOff) {
-    correction.offset_s = correction.rate_s_s = 0;
-  }
-  return correction;
-}
-
-/// A step that is taken off the stamps. Of several heads one may be the only one that steps, and which is not told.
-std::optional<ClockStep> wanted_step(const Clocks& clocks, const Pass& pass, const CalibrationOptions& options) {
-  const bool is_off = options.further_states[FurtherState::kClockOffset] == FurtherStateOptions::Choice::kOff;
-  const bool of_star_tracker = clocks.step && clocks.step->gyro < 0;
-  return of_star_tracker && (is_off || !pass.further_star_trackers.empty()) ? std::nullopt : clocks.step;
-}
-
-/// With states for what the correction of the stamps leaves of the star tracker's clock.
-CalibrationOptions with_clock_states(CalibrationOptions options, const ClockCorrection& correction) {
-  const auto turn_on = [&](FurtherState state, bool wanted) {
-    FurtherStateOptions::Choice& choice = options.further_states[state];
-    if (wanted && choice == FurtherStateOptions::Choice::kAuto && options.estimator != Estimator::kPaper) {
-      choice = FurtherStateOptions::Choice::kOn;
-    }
-  };
-  turn_on(FurtherState::kClockOffset, correction.of_star_tracker());
-  turn_on(FurtherState::kClockRate, correction.rate_s_s != 0);
-  return options;
-}
-
-/// Makes estimates those of the telemetry as it was given.
-void add_to_estimates(const ClockCorrection& correction, std::vector<FurtherEstimate>& estimates) {
-  for (FurtherEstimate& estimate : estimates) {
-    if (estimate.parameter.is_further(FurtherState::kClockOffset)) {
-      estimate.value += correction.offset_s;
-    } else if (estimate.parameter.is_further(FurtherState::kClockRate)) {
-      estimate.value += correction.rate_s_s;
-    }
-  }
-}
-
-/// How far the stamps of the telemetry are off in all: what pass.toml says, what was corrected before the calibration,
-/// and what the calibration found of the rest where it is sure of it. `further`: as add_to_estimates() leaves them.
-std::optional<ClockCorrection> clocks_found(const PassSettings& settings, const ClockCorrection& corrected,
-                                            const std::vector<FurtherEstimate>& further) {
-  constexpr double kSure = 5;
-  const auto is_clock = [](const FurtherEstimate& estimate) {
-    return estimate.parameter.is_further(FurtherState::kClockOffset) ||
-           estimate.parameter.is_further(FurtherState::kClockRate);
-  };
-  ClockCorrection found = corrected;
-  // Offset and rate are correlated: both are taken where one of them is known to be there.
-  if (std::ranges::any_of(further, [&](const FurtherEstimate& estimate) {
-        return is_clock(estimate) && std::abs(estimate.value) >= kSure * estimate.sigma;
-      })) {
-    for (const FurtherEstimate& estimate : further) {
-      if (estimate.parameter.is_further(FurtherState::kClockOffset)) {
-        found.offset_s = estimate.value;
-      } else if (estimate.parameter.is_further(FurtherState::kClockRate)) {
-        found.rate_s_s = estimate.value;
-      }
-    }
-  }
-  found.offset_s += settings.star_tracker_clock_offset_s;
-  found.rate_s_s += settings.star_tracker_clock_rate_s_s;
-  for (std::size_t k = 0; k < std::min(settings.gyros.size(), std::size_t{kMaxGyros}); ++k) {
-    found.late_s[static_cast<int>(k)] += settings.gyros[k].latency_s;
-  }
-  return found.of_star_tracker() || found.of_gyros() ? std::optional(found) : std::nullopt;
-}
-
 /// What is left to correct of stamps that pass.toml has mended, where the clocks still are as the calibration in use
 /// found them. Nothing where it is so old that even a rate known to 0.01 ppm no longer tells the offset.
 ClockCorrection clocks_before(const PassSettings& settings) {
@@ -322,9 +251,10 @@ Rot<In, C> attitude_at_the_end(const Pipeline& pipeline, const CalibrationRun& r
   return run.attitude.size() > 0 ? Rot<In, C>::assume(run.attitude.q_in_c.back()) : Rot<In, C>();
 }
 
-/// `pass`: with its stamps corrected. Without a verdict.
-CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  Decision decision = decide(pass, options, progress);
+/// `pass`: with its stamps corrected; `screened`: by screened_to_decide(), where that was done. Without a verdict.
+CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress,
+                                    std::optional<Screened> screened = {}) {
+  Decision decision = decide(pass, options, progress, std::move(screened));
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   const PassSettings& settings = decision.settings ? *decision.settings : pass.settings;
   CalibrationOptions flown = by_batch ? options_of_on_board_run(settings, decision) : decision.options;
@@ -412,64 +342,6 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   return run;
 }
 
-struct Restamped {
-  Pass pass;
-  double late_s = 0;  ///< what all stamps of the gyros were taken to be late, beside their scatter
-};
-
-/// With regular stamps of the gyros. What stamps that scatter are off in the mean they do not tell, but those of the
-/// star tracker do, up to about as much as they scatter: the mean of a delay is √3 of its scatter where it is even, and
-/// as large as it where it is exponential.
-Restamped with_stamps(const Pass& pass, const RegularStamps& regular) {
-  constexpr double kSure = 5;
-  constexpr double kLikeScatter = 2;
-  Restamped result{pass};
-  result.pass.gyro.t = regular.t;
-  const std::optional<Clocks> clocks = clocks_of(result.pass);
-  if (clocks && clocks->mid_offset_s.is_sure(kSure) &&
-      std::abs(clocks->mid_offset_s.value) < kLikeScatter * regular.scatter_s) {
-    result.late_s = clocks->mid_offset_s.value;
-    for (Time& t : result.pass.gyro.t) {
-      t -= from_seconds(result.late_s);
-    }
-  }
-  return result;
-}
-
-/// How much later after their stamps the fixes of further star trackers were taken than those of the first.
-std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& first_s) {
-  std::vector<Measured> apart_s;
-  Pass of_one;
-  for (std::size_t i = 0; i < pass.further_star_trackers.size(); ++i) {
-    if (i == 0) {
-      of_one.settings = pass.settings;
-      of_one.gyro = pass.gyro;
-    }
-    of_one.settings.star_tracker_noise_rad = pass.settings.further_star_trackers[i].noise_rad;
-    of_one.star_tracker = pass.further_star_trackers[i];
-    const std::optional<Clocks> its = clocks_of(of_one);
-    apart_s.push_back(
-        its ? Measured{its->mid_offset_s.value - first_s.value, std::hypot(its->mid_offset_s.sigma, first_s.sigma)}
-            : Measured{});
-  }
-  return apart_s;
-}
-
-/// A pass without fixes whose errors are those of others, as far as these are alike.
-struct OfIndependentFixes {
-  Pass pass;
-  std::vector<CorrelatedFixes> left_out;
-};
-std::optional<OfIndependentFixes> of_independent_fixes(const Pass& pass) {
-  std::vector<CorrelatedFixes> correlated = correlated_fixes(pass);
-  if (correlated.empty()) {
-    return std::nullopt;
-  }
-  OfIndependentFixes found{pass, std::move(correlated)};
-  leave_out(found.left_out, found.pass);
-  return found;
-}
-
 /// A pass without the fixes beside outages of the star tracker, where these are off.
 struct WithoutErrorsBesideOutages {
   Pass pass;
@@ -512,6 +384,20 @@ std::optional<Calibration> by_pass_alone(Pass pass, const CalibrationOptions& op
   }
 }
 
+/// The pass screened before it is known whether it is calibrated as given: nothing where it turns out that it is not,
+/// or where decide() is to say what is wrong.
+std::optional<Screened> screened_ahead(const Pass& as_given, const CalibrationOptions& options,
+                                       const StopRequest& in_vain) {
+  const StopScope scope(&in_vain);
+  try {
+    return screened_to_decide(as_given, options);
+  } catch (const Stopped&) {
+    return std::nullopt;
+  } catch (const SetupError&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
@@ -521,84 +407,36 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options, const Progress& progress,
                                std::optional<Calibration> known_before) {
   begin_stage(progress, "looks at the clocks");
-  const std::optional<RegularStamps> regular = regular_stamps(as_given);
-  const std::optional<Restamped> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
-  const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
-  const Pass& with_bursts = with_regular ? with_regular->pass : as_given;
-  std::optional<WrongReadings> wrong;
-  std::optional<Pass> rest;
-  std::optional<ReadoutNoise> noise;
-  std::optional<Clocks> clocks;  // of the readings as they are, which is right where nothing is wrong with them
-  side_by_side(
-      [&] {
-        if (finds_noise) {
-          wrong = wrong_for_a_moment(with_bursts);
-          rest = wrong ? without(*wrong, with_bursts) : std::nullopt;
-          noise = other_readout_noise(rest ? *rest : with_bursts);
-        }
-      },
-      [&] { clocks = clocks_of(with_bursts); });
-  const Pass& in_time = rest ? *rest : with_bursts;
-  const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
-  const Pass& as_stamped = with_noise ? *with_noise : in_time;
-  if (rest || noise) {
-    clocks = clocks_of(as_stamped);
-  }
-  std::optional<Pass> without_step;
-  const std::optional<ClockStep> step = clocks ? wanted_step(*clocks, as_stamped, options) : std::nullopt;
-  if (step) {
-    without_step = as_stamped;
-    correct(*without_step, *step);
-    clocks = clocks_of(*without_step);
-  }
-  const Pass& pass = without_step ? *without_step : as_stamped;
-  if (clocks) {
-    clocks->further_star_trackers_s = further_star_trackers_s(pass, clocks->mid_offset_s);
-  }
-  const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
-  std::optional<Pass> corrected;
-  if (correction.of_star_tracker() || correction.of_gyros()) {
-    corrected = pass;
-    correct(*corrected, correction);
-  }
-  const Pass& in_step = corrected ? *corrected : pass;
-  refuse_restarted_gyro(in_step);
-  const std::optional<OfIndependentFixes> independent = finds_noise ? of_independent_fixes(in_step) : std::nullopt;
-  const Pass& of_independent = independent ? independent->pass : in_step;
-  const CalibrationOptions asked = with_clock_states(options, correction);
+  std::optional<CorrectedPass> corrected;
+  std::optional<Screened> screened;  // of the pass as it was given
+  StopRequest in_vain(StopScope::current());
+  side_by_side([&] { corrected.emplace(as_given, options, in_vain); },
+               [&] { screened = screened_ahead(as_given, options, in_vain); });
+  check_stop();
+  const CalibrationOptions& asked = corrected->options();
   std::optional<WithoutErrorsBesideOutages> without_errors;
-  if (finds_noise && !independent) {  // too few of those that stay are beside outages
-    without_errors = without_errors_beside_outages(in_step, asked, progress);
+  // Of correlated fixes too few of those that stay are beside outages.
+  if (options.find_noise && options.estimator != Estimator::kPaper && !corrected->has_correlated_fixes()) {
+    without_errors = without_errors_beside_outages(corrected->pass(), asked, progress);
   }
-  const Pass& stamped = without_errors ? without_errors->pass : of_independent;
-  CalibrationRun run = calibrate_as_stamped(stamped, asked, progress);
-  if (stamped.settings.prior && !known_before) {
-    run.by_pass_alone = by_pass_alone(stamped, asked, progress);
+  const Pass& pass = without_errors ? without_errors->pass : corrected->pass();
+  if (&pass != &as_given) {
+    screened.reset();
+  }
+  CalibrationRun run = calibrate_as_stamped(pass, asked, progress, std::move(screened));
+  if (pass.settings.prior && !known_before) {
+    run.by_pass_alone = by_pass_alone(pass, asked, progress);
   }
   if (without_errors) {
     run.beside_outages = without_errors->errors;
   }
-  if (independent) {
-    run.correlated_fixes = independent->left_out;
-  }
-  run.clocks = clocks;
-  run.corrected_step = step;
-  run.clock_correction = correction;
-  run.readout_noise = noise;
-  if (wrong) {
-    run.bursts = wrong->bursts;
-    run.bursts->left_out = rest.has_value();
-  }
-  run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
-  run.gyro_stamps_late_s = with_regular ? with_regular->late_s : 0;
-  add_to_estimates(correction, run.calibration.further);
-  run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
+  corrected->put_into(run);
   if (known_before) {
     run.known_before = *std::move(known_before);
   }
   run.calibration.determined = determined(run);
   // What changes is judged by the sigmas that are claimed without it.
-  run.calibration.verdict = judge(stamped, run);
+  run.calibration.verdict = judge(pass, run);
   run.covariance_of_constants = run.calibration.covariance;
   put_changes_into_covariance(run);
   return run;
@@ -615,9 +453,12 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& as_stamped = with_noise ? *with_noise : in_time;
-  const std::optional<OfIndependentFixes> independent =
-      options.find_noise ? of_independent_fixes(as_stamped) : std::nullopt;
-  const Pass& stamped = independent ? independent->pass : as_stamped;
+  std::vector<CorrelatedFixes> correlated;
+  if (options.find_noise) {
+    correlated = correlated_fixes(as_stamped);
+  }
+  const std::optional<Pass> independent = without(correlated, as_stamped);
+  const Pass& stamped = independent ? *independent : as_stamped;
   Pipeline pipeline(stamped.settings, settled_for_flight(stamped.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, stamped.gyro.size());
@@ -649,9 +490,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
       run.bursts = wrong->bursts;
     }
   }
-  if (independent) {
-    run.correlated_fixes = independent->left_out;
-  }
+  run.correlated_fixes = std::move(correlated);
   run.clocks = clocks_of(as_stamped);
   if (const std::optional<RegularStamps> regular = regular_stamps(pass)) {
     run.gyro_stamps_off_s = regular->scatter_s;

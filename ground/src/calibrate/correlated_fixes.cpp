@@ -267,4 +267,13 @@ void leave_out(std::vector<CorrelatedFixes>& correlated, Pass& pass) {
   }
 }
 
+std::optional<Pass> without(std::vector<CorrelatedFixes>& correlated, const Pass& pass) {
+  if (correlated.empty()) {
+    return std::nullopt;
+  }
+  Pass rest = pass;
+  leave_out(correlated, rest);
+  return rest;
+}
+
 }  // namespace trihedron::ground

@@ -1,6 +1,7 @@
 #pragma once
 /// Errors of a star tracker that are alike from one fix to the next, as behind a filter of its own.
 
+#include <optional>
 #include <vector>
 
 #include "trihedron/records/pass.hpp"
@@ -15,5 +16,7 @@ namespace trihedron::ground {
 
 /// Leaves out the fixes of these star trackers that come too soon after the last one that stays, and counts them.
 void leave_out(std::vector<CorrelatedFixes>& correlated, Pass& pass);
+/// The pass without them; nothing where there are no such star trackers.
+[[nodiscard]] std::optional<Pass> without(std::vector<CorrelatedFixes>& correlated, const Pass& pass);
 
 }  // namespace trihedron::ground

@@ -95,10 +95,25 @@ Decision for_on_board(Decision decided, const Pass& pass, const Screened& screen
   return decided;
 }
 
-}  // namespace
+/// What there is to decide, once the estimator, the orbit and what is known before the pass have had their say.
+struct Question {
+  CalibrationOptions asked;
+  bool change_is_open = false;
+  bool by_field = false;
+  /// Where nothing is left to be decided by the pass.
+  std::optional<Decision> answer;
 
-Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Progress& progress) {
-  CalibrationOptions asked = asked_for;
+  /// What the pass is screened with.
+  [[nodiscard]] CalibrationOptions to_screen() const {
+    CalibrationOptions options = asked;
+    options.find_noise = false;
+    return options;
+  }
+};
+
+Question question_of(const Pass& pass, const CalibrationOptions& asked_for) {
+  Question its{asked_for, false, false, {}};
+  CalibrationOptions& asked = its.asked;
   if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {
     throw SetupError(fmt::format("the telemetry has {} gyros; the settings speak of {}", pass.gyro.gyros,
                                  pass.settings.gyros.size()),
@@ -108,52 +123,71 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
     const std::optional<double> shown = shown_orbital_rate_rad_s(pass.star_tracker);
     asked.orbital_rate_rad_s = shown ? *shown : first_orbital_rate_rad_s(pass.settings);
   }
-  const bool change_is_open = asked.further_states[FurtherState::kCoefficientChange] == Choice::kAuto;
+  its.change_is_open = asked.further_states[FurtherState::kCoefficientChange] == Choice::kAuto;
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    Decision settled;
-    settled.options = settled_before(pass.settings, asked);
-    return settled;
+    its.answer.emplace().options = settled_before(pass.settings, asked);
+    return its;
   }
-  const bool on_board = asked.estimator != Estimator::kBatch;
-  const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
-  if (by_field) {
+  its.by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
+  if (its.by_field) {
     asked.drift_field = true;
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision;
-  decision.options = asked;
-  CalibrationOptions& options = decision.options;
-  options.find_noise = false;
   const bool states_are_settled =
       asked.drift_model && std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
         return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
       });
   if (states_are_settled && !asked.find_noise && !asked.drift_field) {
-    leave_out_what_is_open(options);
-    return decision;
+    its.answer.emplace().options = its.to_screen();
+    leave_out_what_is_open(its.answer->options);
   }
+  return its;
+}
+
+Screened screened_for(const Pass& pass, const Question& question) {
+  return screen(pass, question.to_screen(), may_be_screened_with(question.asked));
+}
+
+}  // namespace
+
+std::optional<Screened> screened_to_decide(const Pass& pass, const CalibrationOptions& asked) {
+  const Question question = question_of(pass, asked);
+  return question.answer ? std::nullopt : std::optional(screened_for(pass, question));
+}
+
+Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Progress& progress,
+                std::optional<Screened> screened_before) {
+  Question question = question_of(pass, asked_for);
+  if (question.answer) {
+    return *std::move(question.answer);
+  }
+  const CalibrationOptions& asked = question.asked;
   begin_stage(progress, "screens the samples");
-  Screened screened = screen(pass, options, may_be_screened_with(asked));
+  Screened screened = screened_before ? *std::move(screened_before) : screened_for(pass, question);
   std::optional<OnBoardRun> run = std::exchange(screened.run, std::nullopt);
   if (screened.pass.fixes.empty()) {
+    Decision decision;
+    CalibrationOptions& options = decision.options;
+    options = question.to_screen();
     options.estimator = asked_for.estimator;
     options.drift_field = asked_for.drift_field;
     options.drift_model = asked_for.drift_model;
     leave_out_what_is_open(options);
     return decision;
   }
-  if (by_field && on_board) {
-    Decision decided = for_on_board(
-        decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open, progress), pass, screened);
+  if (question.by_field && asked_for.estimator != Estimator::kBatch) {
+    Decision decided =
+        for_on_board(decide_with_course(pass, screened, asked, kLargestDriftModel, question.change_is_open, progress),
+                     pass, screened);
     decided.options.estimator = asked_for.estimator;
     decided.run = std::move(run);
     return decided;
   }
   DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {
-    Decision decided = decide_with_course(pass, screened, asked, largest_model, change_is_open, progress);
+    Decision decided = decide_with_course(pass, screened, asked, largest_model, question.change_is_open, progress);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() ||

@@ -124,6 +124,20 @@ TEST(Stop, IsSeenByTheWorkOfTheThreadThatAskedForItAlone) {
   EXPECT_NO_THROW(check_stop());
 }
 
+TEST(Stop, OfAPartIsMadeWithThatOfTheWhole) {
+  StopRequest whole;
+  StopRequest part(&whole);
+  EXPECT_FALSE(part.made());
+  whole.make();
+  EXPECT_TRUE(part.made());
+
+  StopRequest another;
+  StopRequest part_of_it(&another);
+  part_of_it.make();
+  EXPECT_TRUE(part_of_it.made());
+  EXPECT_FALSE(another.made());
+}
+
 TEST(Stop, EndsWorkThatIsNestedOnAllCores) {
   StopRequest request;
   const StopScope scope(&request);

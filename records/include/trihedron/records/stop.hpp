@@ -15,12 +15,19 @@ class Stopped : public std::exception {
 /// May be made from another thread, and by the handler of a signal.
 class StopRequest {
  public:
+  StopRequest() = default;
+  /// Made as well where `also` is, if any, to which it refers: of a part of the work that may turn out to be in vain.
+  explicit StopRequest(const StopRequest* also) noexcept : also_(also) {}
+
   void make() noexcept { made_.store(true, std::memory_order_relaxed); }
-  [[nodiscard]] bool made() const noexcept { return made_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool made() const noexcept {
+    return made_.load(std::memory_order_relaxed) || (also_ != nullptr && also_->made());
+  }
 
  private:
   static_assert(std::atomic<bool>::is_always_lock_free, "the handler of a signal may not wait for a lock");
   std::atomic<bool> made_ = false;
+  const StopRequest* also_ = nullptr;
 };
 
 /// While it lives, this request stops what its thread does. Work that ground/tasks gives to other threads has the
