@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
-#include <set>
 
 namespace trihedron::report {
 namespace {
@@ -12,9 +12,10 @@ constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 constexpr int kDigits = 5;
 constexpr double kTimeStepsPerUnit = 1000;
 
-/// Rows of one bucket, [begin, end).
+/// Appends rows of one bucket, [begin, end), in their order, some more than once.
 void keep_extremes(std::span<const std::vector<double>> channels, std::size_t begin, std::size_t end,
-                   std::set<std::size_t>& keep) {
+                   std::vector<std::size_t>& keep) {
+  const std::size_t before = keep.size();
   for (const std::vector<double>& channel : channels) {
     std::size_t least = end;
     std::size_t greatest = end;
@@ -22,7 +23,7 @@ void keep_extremes(std::span<const std::vector<double>> channels, std::size_t be
     for (std::size_t i = begin; i < end; ++i) {
       if (std::isnan(channel[i])) {
         if (!has_gap) {
-          keep.insert(i);
+          keep.push_back(i);
         }
         has_gap = true;
         continue;
@@ -31,10 +32,11 @@ void keep_extremes(std::span<const std::vector<double>> channels, std::size_t be
       greatest = greatest == end || channel[i] > channel[greatest] ? i : greatest;
     }
     if (least != end) {
-      keep.insert(least);
-      keep.insert(greatest);
+      keep.push_back(least);
+      keep.push_back(greatest);
     }
   }
+  std::sort(keep.begin() + static_cast<std::ptrdiff_t>(before), keep.end());
 }
 
 }  // namespace
@@ -44,7 +46,7 @@ std::vector<std::size_t> decimate(std::span<const double> t, std::span<const std
   if (t.empty()) {
     return {};
   }
-  std::set<std::size_t> keep{0, t.size() - 1};
+  std::vector<std::size_t> keep{0};
   const double scale = static_cast<double>(buckets) / (t.back() - t.front());
   const auto bucket_of = [&](std::size_t i) { return std::floor((t[i] - t.front()) * scale); };
   for (std::size_t begin = 0; begin < t.size();) {
@@ -55,7 +57,9 @@ std::vector<std::size_t> decimate(std::span<const double> t, std::span<const std
     keep_extremes(channels, begin, end, keep);
     begin = end;
   }
-  return {keep.begin(), keep.end()};
+  keep.push_back(t.size() - 1);
+  keep.erase(std::unique(keep.begin(), keep.end()), keep.end());
+  return keep;
 }
 
 double rounded(double value, int digits) {

@@ -20,7 +20,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Duration kSlowestSamples = std::chrono::seconds(1);
 constexpr double kLongestBurst_s = 4;
-constexpr std::size_t kLengths[] = {2, 4, 8, 16, 32};  // of bursts, samples
+constexpr std::size_t kLongest = 32;  // samples of a burst; the lengths looked for are 2, 4, 8 and so on
 /// The course is the median of what is read from this long before to this long after, by means over half a second.
 constexpr double kCourse_s = 6;
 constexpr double kMeanOver_s = 0.5;
@@ -50,6 +50,27 @@ double median_of_known(std::span<const double> values) {
   return known.empty() ? kNaN : median_of(known);
 }
 
+/// The numbers among some values that come and go, in order.
+class SortedKnown {
+ public:
+  void add(double value) {
+    if (std::isfinite(value)) {
+      sorted_.insert(std::ranges::lower_bound(sorted_, value), value);
+    }
+  }
+  /// Takes away one that was added.
+  void remove(double value) {
+    if (std::isfinite(value)) {
+      sorted_.erase(std::ranges::lower_bound(sorted_, value));
+    }
+  }
+  /// As median_of(); NaN where there is none.
+  [[nodiscard]] double median() const { return sorted_.empty() ? kNaN : sorted_[sorted_.size() / 2]; }
+
+ private:
+  std::vector<double> sorted_;
+};
+
 /// What an angle is off its course, sample by sample; NaN where it is not known, or too near to an end of the span.
 class OffCourse {
  public:
@@ -70,8 +91,13 @@ class OffCourse {
     const double mean_s = static_cast<double>(per_mean_) * period_s;
     const std::size_t half = std::max(kFewestMeans, static_cast<std::size_t>(std::ceil(kCourse_s / mean_s)));
     course_.assign(means_.size(), kNaN);
-    for (std::size_t j = half; j + half < means_.size(); ++j) {
-      course_[j] = median_of_known(std::span(means_).subspan(j - half, 2 * half + 1));
+    SortedKnown around;
+    for (std::size_t j = 0; j < means_.size(); ++j) {
+      around.add(means_[j]);
+      if (j >= 2 * half) {
+        course_[j - half] = around.median();
+        around.remove(means_[j - 2 * half]);
+      }
     }
     for (std::size_t i = 0; i < off_rad_.size(); ++i) {
       off_rad_[i] = angles_rad[i] - course_at(i);
@@ -132,17 +158,13 @@ class SigmaOfSums {
   double least_ = 0;
 };
 
-/// Sums over so many samples, from each one on.
-std::vector<double> sums_over(std::size_t length, const std::vector<double>& off) {
-  std::vector<double> sums(off.size(), kNaN);
-  for (std::size_t i = 0; i + length <= off.size(); ++i) {
-    double sum = 0;
-    for (std::size_t j = i; j < i + length; ++j) {
-      sum += off[j];
-    }
-    sums[i] = sum;
+/// Sums over twice as many samples, from each one on; `sums`: over `length`.
+std::vector<double> sums_over_twice(std::size_t length, const std::vector<double>& sums) {
+  std::vector<double> twice(sums.size(), kNaN);
+  for (std::size_t i = 0; i + length < sums.size(); ++i) {
+    twice[i] = sums[i] + sums[i + length];
   }
-  return sums;
+  return twice;
 }
 
 /// The angle between the momenta of two gyros, sample by sample; NaN where it is not known. Less what turns of the one
@@ -238,11 +260,10 @@ std::vector<Burst> bursts_in(std::span<const double> angles_rad, double period_s
   const OffCourse course(angles_rad, period_s);
   const std::vector<double>& off = course.rad();
   std::vector<Burst> likely;
-  for (const std::size_t length : kLengths) {
-    if (static_cast<double>(length) * period_s > kLongestBurst_s) {
-      break;
-    }
-    const std::vector<double> sums = sums_over(length, off);
+  std::vector<double> sums = off;
+  for (std::size_t length = 2; length <= kLongest && static_cast<double>(length) * period_s <= kLongestBurst_s;
+       length *= 2) {
+    sums = sums_over_twice(length / 2, sums);
     const SigmaOfSums sigma(sums, period_s, told_rad * std::sqrt(static_cast<double>(length)));
     for (std::size_t i = 0; i < sums.size(); ++i) {
       if (const double sigmas = std::abs(sums[i]) / sigma.at(i); sigmas > kBeyond) {
