@@ -171,9 +171,8 @@ std::vector<std::filesystem::path> output_names(const std::vector<io::NamedPass>
 void expect_apart(const std::vector<io::NamedPass>& passes, const CalibrationFiles& files) {
   std::vector<std::filesystem::path> inputs = {files.config};
   for (const io::NamedPass& pass : passes) {
-    inputs.push_back(pass.path);
-    inputs.push_back(pass.loaded.prior_file);
-    inputs.insert(inputs.end(), pass.loaded.sources.begin(), pass.loaded.sources.end());
+    const std::vector<std::filesystem::path> its = io::inputs_of(pass.path, pass.loaded);
+    inputs.insert(inputs.end(), its.begin(), its.end());
   }
   std::vector<std::filesystem::path> outputs = {files.out};
   for (const std::filesystem::path& name : output_names(passes)) {
@@ -199,6 +198,8 @@ std::vector<std::string> estimator_names() {
 }
 
 }  // namespace
+
+std::span<const std::string_view> outcome_files() { return kOutcomeFiles; }
 
 void stage_calibration(io::StagedDirectory& staged, const io::NamedPass& pass, const CalibrationRun& run,
                        ground::CalibrationEvaluation evaluation, const CalibrationOptions& options) {

@@ -45,6 +45,10 @@ constexpr std::string_view kJournalFile = "runs.journal";
 constexpr std::string_view kTableFile = "runs.nc";
 constexpr std::string_view kTimesFile = "times.csv";
 constexpr std::string_view kCampaignReport = "report.html";
+// Of a run that is replayed.
+constexpr std::string_view kScenarioFile = "scenario.toml";
+constexpr std::string_view kRunFile = "run.json";
+constexpr std::string_view kPassFile = "pass.nc";
 
 struct CampaignArguments {
   std::string file;
@@ -226,8 +230,8 @@ bool is_same(RunRecord a, const RunRecord& b) {
 void stage_flight(io::StagedDirectory& staged, const io::CampaignFile& file, const RunRecord& record,
                   campaign::Flight&& flight) {
   const Scenario scenario = file.scenario(record.seed, record.draws);
-  io::write_pass(staged.path() / "pass.nc", flight.simulated.pass, &flight.simulated.truth, io::format_for(scenario));
-  io::NamedPass pass{staged.path() / "pass.nc", fmt::format("run-{}", record.run), {}, {}};
+  io::write_pass(staged.path() / kPassFile, flight.simulated.pass, &flight.simulated.truth, io::format_for(scenario));
+  io::NamedPass pass{staged.path() / kPassFile, fmt::format("run-{}", record.run), {}, {}};
   pass.loaded.pass = std::move(flight.simulated.pass);
   pass.truth = std::move(flight.simulated.truth);
   stage_calibration(staged, pass, flight.run, std::move(flight.evaluation), file.options(record.draws));
@@ -244,6 +248,11 @@ ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arg
   std::optional<io::StagedDirectory> staged;
   const fs::path directory = fs::path(arguments.out) / fmt::format("run-{}", run);
   if (!arguments.out.empty()) {
+    std::vector<fs::path> outputs = {directory / kScenarioFile, directory / kRunFile, directory / kPassFile};
+    for (const std::string_view name : outcome_files()) {
+      outputs.push_back(directory / name);
+    }
+    io::expect_apart(file.inputs(), outputs);
     journal = journal_in(arguments.out, file.identity(TRIHEDRON_VERSION));
     staged.emplace(directory);
   }
@@ -266,8 +275,8 @@ ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arg
     }
   }
   if (staged) {
-    io::write_file(staged->path() / "scenario.toml", file.scenario_text(record.seed, record.draws));
-    io::write_file(staged->path() / "run.json", json_text(run_json(plan, record)) + "\n");
+    io::write_file(staged->path() / kScenarioFile, file.scenario_text(record.seed, record.draws));
+    io::write_file(staged->path() / kRunFile, json_text(run_json(plan, record)) + "\n");
     if (flight) {
       stage_flight(*staged, file, record, std::move(*flight));
     }

@@ -1,5 +1,7 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,11 +55,15 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad =
         of_option("--limit", [&] { return io::parse_angle_rad(arguments->limit, limits::kAttitudeLimit_rad); });
+    if (std::ranges::count(std::array{arguments->attitude, arguments->before, arguments->truth}, kStandardStream) > 1) {
+      throw io::UsageError(
+          "of --attitude, --before and --truth only one can be standard input: name a file for the others");
+    }
     const io::NamedPass pass = io::read_named_pass(arguments->pass);
     const Time epoch = pass.pass().settings.epoch;
     Truth told;
     if (!arguments->truth.empty()) {
-      const AttitudeHistory truth = io::read_attitude(arguments->truth, epoch);
+      const AttitudeHistory truth = io::read_attitude(source(arguments->truth), epoch);
       told.t = truth.t;
       told.q_in_c = truth.q_in_c;
     }

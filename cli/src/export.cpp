@@ -99,6 +99,15 @@ std::vector<std::string> files_of(const ExportArguments& arguments) {
   return files;
 }
 
+/// `inputs`: that the outputs are not to replace.
+void expect_outputs_apart(const ExportArguments& arguments, const std::vector<std::filesystem::path>& inputs) {
+  if (arguments.output == kStandardStream) {
+    return;
+  }
+  const std::vector<std::string> files = files_of(arguments);
+  io::expect_apart(inputs, std::vector<std::filesystem::path>(files.begin(), files.end()));
+}
+
 void expect_places(const ExportArguments& arguments) {
   const bool several = files_of(arguments).size() > 1;
   if (arguments.output == kStandardStream) {
@@ -107,13 +116,9 @@ void expect_places(const ExportArguments& arguments) {
     }
     return;
   }
-  std::vector<std::filesystem::path> written;
-  for (const std::string& file : files_of(arguments)) {
-    written.emplace_back(file);
-  }
-  const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass, arguments.attitude};
-  io::expect_apart(inputs, written);
-  io::expect_apart_from_each_other(written);
+  expect_outputs_apart(arguments, {arguments.file, arguments.epoch.pass, arguments.attitude});
+  const std::vector<std::string> files = files_of(arguments);
+  io::expect_apart_from_each_other(std::vector<std::filesystem::path>(files.begin(), files.end()));
 }
 
 /// Each whole, and none where one cannot be written.
@@ -200,11 +205,12 @@ std::size_t row_of(const ExportArguments& arguments, const io::AttitudeMessage& 
 
 Duration gap_of(const ExportArguments& arguments, const AttitudeHistory& attitude) {
   return arguments.gap.empty() ? io::usual_gap(attitude)
-                               : of_option("--gap", [&] { return io::parse_duration(arguments.gap); });
+                               : of_option("--gap", [&] { return io::parse_duration(arguments.gap, limits::kGap_s); });
 }
 
 void export_attitude(const ExportArguments& arguments, const Common& common) {
   const EpochSource epoch_source = epoch_of(arguments.epoch);
+  expect_outputs_apart(arguments, epoch_source.inputs);
   const io::MessageDescription description = description_of(arguments, epoch_source);
   const io::AttitudeMessage read = io::read_attitude_of_any_format(source(arguments.file), epoch_source.epoch);
   const Time epoch = epoch_source.epoch.value_or(read.epoch.value_or(read.attitude.t.front()));
@@ -254,6 +260,7 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
     pass = io::read_named_pass(arguments.epoch.pass);
     const PassSettings& settings = pass->pass().settings;
     epoch_source = {settings.epoch, settings.spacecraft, {}, body_is_told(settings)};
+    expect_outputs_apart(arguments, io::inputs_of(pass->path, pass->loaded));
   }
   const io::MessageDescription description = description_of(arguments, epoch_source);
   const Calibration calibration = io::read_calibration(source(arguments.file));
@@ -319,8 +326,8 @@ void export_pass(const ExportArguments& arguments, const Common& common) {
     contents.push_back(files.prior);
   }
   std::vector<std::filesystem::path> inputs = io::files_of_pass(arguments.file, 1 + pass.further_star_trackers.size());
-  inputs.emplace_back(loaded.prior_file);
-  inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
+  const std::vector<std::filesystem::path> read = io::inputs_of(arguments.file, loaded);
+  inputs.insert(inputs.end(), read.begin(), read.end());
   const std::vector<std::filesystem::path> outputs(written.begin(), written.end());
   io::expect_apart(inputs, outputs);
   io::expect_apart_from_each_other(outputs);

@@ -42,7 +42,8 @@ EpochSource epoch_of(const EpochOptions& options) {
   if (!options.pass.empty()) {
     const io::NamedPass pass = io::read_named_pass(options.pass);
     const PassSettings& settings = pass.pass().settings;
-    return {settings.epoch, settings.spacecraft, settings.inertial_frame, body_is_told(settings)};
+    return {settings.epoch, settings.spacecraft, settings.inertial_frame, body_is_told(settings),
+            io::inputs_of(pass.path, pass.loaded)};
   }
   if (options.epoch.empty()) {
     return {};
@@ -146,9 +147,8 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
   const io::NamedPass named = io::read_named_pass(arguments.file, io::TruthUse::kToCompare, selection_of(arguments));
   const io::LoadedPass& loaded = named.loaded;
   log_pass(common.log, arguments.file, loaded);
-  std::vector<std::filesystem::path> inputs = {arguments.file};
+  std::vector<std::filesystem::path> inputs = io::inputs_of(arguments.file, loaded);
   inputs.insert(inputs.end(), arguments.exclude.begin(), arguments.exclude.end());
-  inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
   std::vector<std::filesystem::path> outputs =
       io::files_of_pass(arguments.output, 1 + loaded.pass.further_star_trackers.size());
   const bool was_there = any_is_there(outputs);
@@ -165,6 +165,13 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
       [&] { return pass_text(loaded) + written_pass_text(arguments.output, was_there); });
 }
 
+void expect_output_apart(const ImportArguments& arguments, const std::vector<std::filesystem::path>& inputs) {
+  if (arguments.output != kStandardStream) {
+    const std::filesystem::path output = arguments.output;
+    io::expect_apart(inputs, {&output, 1});
+  }
+}
+
 void put_imported(const ImportArguments& arguments, const std::string& text) {
   if (arguments.output == kStandardStream) {
     print_data(stdout, text);
@@ -174,7 +181,9 @@ void put_imported(const ImportArguments& arguments, const std::string& text) {
 }
 
 void import_attitude(const ImportArguments& arguments, const Common& common, const io::AttitudeMessage& message) {
-  const std::optional<Time> told = epoch_of(arguments.epoch).epoch;
+  const EpochSource epoch_source = epoch_of(arguments.epoch);
+  expect_output_apart(arguments, epoch_source.inputs);
+  const std::optional<Time> told = epoch_source.epoch;
   const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
   put_imported(arguments, io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s));
   show_interchange(beside(arguments.output, common),
@@ -199,10 +208,7 @@ void import_calibration(const ImportArguments& arguments, const Common& common, 
   if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
     throw io::UsageError("--pass and --epoch are for an attitude; the epoch of a calibration is in its message");
   }
-  if (arguments.output != kStandardStream) {
-    const std::filesystem::path output = arguments.output;
-    io::expect_apart({&message.covariance_file, 1}, {&output, 1});
-  }
+  expect_output_apart(arguments, {message.covariance_file});
   std::string written = "calibration";
   if (!message.has_full_covariance) {
     written +=
@@ -234,11 +240,7 @@ void import_message(const ImportArguments& arguments, const Common& common) {
   if (!arguments.from.empty() || !arguments.to.empty() || !arguments.exclude.empty()) {
     throw io::UsageError("--from, --to and --exclude are for a pass, and this is taken for a message");
   }
-  if (arguments.output != kStandardStream) {
-    const std::filesystem::path written = arguments.output;
-    const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass};
-    io::expect_apart(inputs, {&written, 1});
-  }
+  expect_output_apart(arguments, {arguments.file, arguments.epoch.pass});
   const auto message = io::read_message(source(arguments.file));
   if (const auto* const calibration = std::get_if<io::CalibrationMessage>(&message)) {
     import_calibration(arguments, common, *calibration);

@@ -26,6 +26,7 @@ struct EpochSource {
   std::string spacecraft;        ///< of the pass; empty without one
   std::string inertial_frame{};  ///< same
   bool body_is_told = false;     ///< the pass says how the star tracker is mounted: its axes are not those of the body
+  std::vector<std::filesystem::path> inputs{};  ///< files that the pass was read from
 };
 
 /// Whether a pass says how its star tracker is mounted, other than along the axes of the body.

@@ -37,8 +37,8 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   }
   const bool to_stdout = files.attitude == kStandardStream;
   if (!to_stdout) {
-    std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
-    inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
+    std::vector<std::filesystem::path> inputs = io::inputs_of(pass, loaded);
+    inputs.insert(inputs.end(), {files.calibration, files.config});
     io::expect_apart(inputs, {&files.attitude, 1});
     io::expect_writable(files.attitude);
   }

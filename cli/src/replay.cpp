@@ -367,14 +367,18 @@ void write_records(const fs::path& path, const Pass& pass, const Parameters& par
   file.commit();
 }
 
-void expect_apart(const ReplayRequest& request, const fs::path& prior) {
+void expect_apart(const ReplayRequest& request, const io::LoadedPass& loaded) {
   const ReplayFiles& files = request.files;
-  const std::vector<fs::path> inputs = {request.pass, prior, files.config};
-  std::vector<fs::path> outputs;
-  for (const fs::path& output : {files.attitude, files.calibration, files.state, files.records}) {
-    if (output != kStandardStream) {
-      outputs.push_back(output);
+  std::vector<fs::path> inputs = io::inputs_of(request.pass, loaded);
+  inputs.push_back(files.config);
+  std::vector<fs::path> outputs = {files.calibration, files.state, files.records};
+  for (const fs::path& output : outputs) {
+    if (output == kStandardStream) {
+      throw io::UsageError("the attitude alone can be written to standard output: name a file for the others");
     }
+  }
+  if (files.attitude != kStandardStream) {
+    outputs.push_back(files.attitude);
   }
   io::expect_apart_from_each_other(outputs);
   io::expect_apart(inputs, outputs);
@@ -421,7 +425,7 @@ ExitStatus replay_pass(const ReplayRequest& request, const Common& common) {
   const io::LoadedPass loaded = io::read_pass(request.pass);
   log_pass(common.log, request.pass.string(), loaded);
   log_settings(common.log, request.options);
-  expect_apart(request, loaded.prior_file);
+  expect_apart(request, loaded);
   if (!request.files.calibration.empty()) {
     io::expect_writable(request.files.calibration);
   }

@@ -2,7 +2,9 @@
 /// Work that the commands and the demonstration share.
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "commands.hpp"
@@ -35,6 +37,9 @@ struct Calibrated {
 [[nodiscard]] Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
                                         const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
                                         const Common& common);
+
+/// Names of the files that a calibration of one pass may write.
+[[nodiscard]] std::span<const std::string_view> outcome_files();
 
 /// Stages the files of a calibration that has been made and evaluated.
 void stage_calibration(io::StagedDirectory& staged, const io::NamedPass& pass, const CalibrationRun& run,

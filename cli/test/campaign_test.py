@@ -236,6 +236,15 @@ def test_outputs_are_as_their_schemas_say(finished):
         jsonschema.validate({**campaign, "more": 1}, schema("campaign-output"))
 
 
+def test_a_run_that_is_replayed_does_not_replace_the_scenario_of_its_campaign(tmp_path):
+    base = tmp_path / "out" / "run-0" / "scenario.toml"
+    base.parent.mkdir(parents=True)
+    base.write_text('# looked at\n[scenario]\nduration = "5min"\n')
+    (tmp_path / "campaign.toml").write_text('base = "out/run-0/scenario.toml"\n' + CAMPAIGN.replace('[base.scenario]\nduration = "5min"\n', ""))
+    refused(run("campaign", tmp_path / "campaign.toml", "-o", tmp_path / "out", "--only", "0"), WRONG_USAGE, "scenario.toml")
+    assert base.read_text().startswith("# looked at")
+
+
 def test_progress_with_its_rate_goes_to_a_terminal_only(finished, tmp_path):
     master, slave = pty.openpty()
     process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", tmp_path / "out"], stdout=subprocess.DEVNULL, stderr=slave)

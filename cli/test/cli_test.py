@@ -427,6 +427,14 @@ def test_evaluation_without_truth_is_against_the_star_tracker(csv_pass, tmp_path
     assert "against the star tracker" in result.stdout
 
 
+def test_evaluation_takes_its_truth_from_standard_input_and_one_file_alone(csv_pass, tmp_path):
+    run("navigate", csv_pass, "--prior", "-o", tmp_path / "a.csv")
+    truth = (tmp_path / "a.csv").read_text()
+    evaluated = run("--json", "evaluate", csv_pass, "--attitude", tmp_path / "a.csv", "--truth", "-", input=truth)
+    assert evaluated.returncode == TRUSTWORTHY, evaluated.stderr
+    refused(run("evaluate", csv_pass, "--attitude", "-", "--before", "-"), WRONG_USAGE, "standard input")
+
+
 def test_installed_help_names_every_command():
     result = run("--help")
     assert result.returncode == 0

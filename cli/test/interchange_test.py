@@ -178,6 +178,21 @@ def test_what_is_read_is_never_replaced(flown, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.aem", "a.csv", "b.tf"]
 
 
+def test_the_prior_of_a_pass_is_not_replaced(flown, tmp_path):
+    shutil.copytree(flown / "pass", tmp_path / "pass")
+    settings = tmp_path / "pass" / "pass.toml"
+    settings.write_text(settings.read_text().replace("[pass]", '[pass]\nprior = "../known.json"', 1))
+    known = (flown / "out" / "calibration.json").read_bytes()
+    (tmp_path / "known.json").write_bytes(known)
+    refused(run("export", flown / "a.csv", "--format", "aem", "--pass", tmp_path / "pass", "-o", tmp_path / "known.json"), WRONG_USAGE, "replace")
+    assert (tmp_path / "known.json").read_bytes() == known
+
+
+@pytest.mark.parametrize("gap", ["0s", "1ns"])
+def test_a_gap_is_a_time_between_epochs(flown, tmp_path, gap):
+    refused(run("export", flown / "a.csv", "--format", "aem", "--pass", flown / "pass", "--gap", gap, "-o", tmp_path / "a.aem"), WRONG_USAGE, "--gap")
+
+
 def test_what_is_of_another_kind_is_refused_for_what_it_is(flown, tmp_path):
     exporting = ("-o", tmp_path / "none")
     refused(run("export", flown / "pass" / "truth.json", "--format", "aem", *exporting), INPUT_REFUSED, "truth.json: is JSON", "`export` writes acm, acm-xml and fk")

@@ -382,6 +382,12 @@ def test_a_state_goes_with_its_pass_its_settings_and_its_attitude(broken_off, tw
     assert run(*arguments).returncode == DO_NOT_USE
 
 
+@pytest.mark.parametrize("output", ["--calibration", "--state", "--records"])
+def test_only_the_attitude_goes_to_standard_output(minutes, tmp_path, output):
+    refused(run("replay", minutes, "--speed", "max", output, "-", cwd=tmp_path), WRONG_USAGE, "standard output")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_file_that_is_no_state_is_not_replaced(minutes, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     refused(run("replay", minutes, "--speed", "max", "--state", tmp_path / "notes.txt"), WRONG_USAGE, "no state")

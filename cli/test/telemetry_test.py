@@ -113,6 +113,18 @@ def test_what_does_not_go_together_is_wrong_usage(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.fixture(scope="module")
+def read_by_a_map(tmp_path_factory):
+    """The example, beside it a calibration of it and an attitude in two forms."""
+    directory = tmp_path_factory.mktemp("map") / "mine"
+    shutil.copytree(EXAMPLE, directory)
+    run("calibrate", directory / "telemetry.toml", "-o", directory.parent / "out")
+    for name in ("attitude.csv", "calibration.json"):
+        shutil.copy(directory.parent / "out" / name, directory)
+    done("export", directory / "attitude.csv", "--format", "aem", "--pass", directory / "telemetry.toml", "-o", directory / "attitude.aem")
+    return directory
+
+
 def test_what_is_read_is_never_replaced(tmp_path):
     directory = tmp_path / "mine"
     shutil.copytree(EXAMPLE, directory)
@@ -124,6 +136,24 @@ def test_what_is_read_is_never_replaced(tmp_path):
     (directory / "telemetry.toml").write_text(toml)
     refused(run("import", directory / "telemetry.toml", "-o", tmp_path), WRONG_USAGE, "star_tracker.csv")
     assert (tmp_path / "star_tracker.csv").read_bytes() == before["star_tracker.csv"]
+
+
+@pytest.mark.parametrize("command", [
+    ("navigate", "telemetry.toml", "--prior", "-o", "gyros.csv"),
+    ("replay", "telemetry.toml", "--speed", "max", "-o", "gyros.csv"),
+    ("replay", "telemetry.toml", "--speed", "max", "--calibration", "gyros.csv"),
+    ("replay", "telemetry.toml", "--speed", "max", "--state", "star_tracker.csv"),
+    ("replay", "telemetry.toml", "--speed", "max", "--records", "star_tracker.csv"),
+    ("export", "telemetry.toml", "--format", "packets", "-o", "gyros.csv"),
+    ("export", "attitude.csv", "--format", "aem", "--pass", "telemetry.toml", "-o", "gyros.csv"),
+    ("export", "calibration.json", "--format", "fk", "--pass", "telemetry.toml", "-o", "gyros.csv"),
+    ("import", "attitude.aem", "--pass", "telemetry.toml", "-o", "gyros.csv"),
+    ("import", "telemetry.toml", "-o", "gyros.csv"),
+], ids=" ".join)
+def test_no_command_replaces_the_files_that_a_telemetry_toml_names(read_by_a_map, command):
+    before = {path.name: path.read_bytes() for path in read_by_a_map.iterdir()}
+    refused(run(*command, cwd=read_by_a_map), WRONG_USAGE, "replace")
+    assert {path.name: path.read_bytes() for path in read_by_a_map.iterdir()} == before
 
 
 @pytest.mark.long

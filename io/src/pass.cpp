@@ -400,6 +400,12 @@ LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   return screened(format->read(path), path, selection);
 }
 
+std::vector<std::filesystem::path> inputs_of(const std::filesystem::path& path, const LoadedPass& loaded) {
+  std::vector<std::filesystem::path> inputs = {path, loaded.prior_file};
+  inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
+  return inputs;
+}
+
 LoadedPass read_telemetry(const fs::path& file, const ReadColumns& others) {
   check_there(file);
   return screened(read_raw_telemetry(file, others), file, {});

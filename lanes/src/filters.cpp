@@ -15,7 +15,7 @@ Filters::Filters(std::span<Lane* const> lanes, const Kernels& kernels)
     const Lane::Estimator& estimator = *lanes_[std::min(i, lanes_.size() - 1)]->estimator;
     const CalibrationSetup& setup = estimator.setup();
     for (int state = 0; state < kStates; ++state) {
-      filter_->root[state * (kColumns + 1)][i] = 1;
+      filter_->root[state * (kStates + 1)][i] = 1;
     }
     put(setup.star_trackers[0].noise_rad.cwiseAbs2(), i, filter_->fix_variance_rad2);
     filter_->direction_random_walk_rad_sqrt_s[i] = setup.direction_random_walk_rad_sqrt_s;

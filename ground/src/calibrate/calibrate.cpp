@@ -384,11 +384,11 @@ std::optional<Calibration> by_pass_alone(Pass pass, const CalibrationOptions& op
   }
 }
 
-/// The pass screened before it is known whether it is calibrated as given: nothing where it turns out that it is not,
-/// or where decide() is to say what is wrong.
+/// The pass screened before it is known whether it needs a correction: nothing where that turns out, or where decide()
+/// is to say what is wrong.
 std::optional<Screened> screened_ahead(const Pass& as_given, const CalibrationOptions& options,
-                                       const StopRequest& in_vain) {
-  const StopScope scope(&in_vain);
+                                       const StopRequest& stop_screening) {
+  const StopScope scope(&stop_screening);
   try {
     return screened_to_decide(as_given, options);
   } catch (const Stopped&) {
@@ -407,22 +407,33 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options, const Progress& progress,
                                std::optional<Calibration> known_before) {
   begin_stage(progress, "looks at the clocks");
+  StopRequest stop_screening(StopScope::current());
   std::optional<CorrectedPass> corrected;
   std::optional<Screened> screened;  // of the pass as it was given
-  StopRequest in_vain(StopScope::current());
-  side_by_side([&] { corrected.emplace(as_given, options, in_vain); },
-               [&] { screened = screened_ahead(as_given, options, in_vain); });
+  side_by_side(
+      [&] {
+        try {
+          corrected.emplace(as_given, options, stop_screening);
+        } catch (...) {
+          stop_screening.make();
+          throw;
+        }
+      },
+      [&] { screened = screened_ahead(as_given, options, stop_screening); });
   check_stop();
+  if (&corrected->pass() != &as_given) {
+    screened.reset();
+  }
   const CalibrationOptions& asked = corrected->options();
   std::optional<WithoutErrorsBesideOutages> without_errors;
   // Of correlated fixes too few of those that stay are beside outages.
-  if (options.find_noise && options.estimator != Estimator::kPaper && !corrected->has_correlated_fixes()) {
+  if (looks_for_noise(options) && !corrected->has_correlated_fixes()) {
     without_errors = without_errors_beside_outages(corrected->pass(), asked, progress);
   }
-  const Pass& pass = without_errors ? without_errors->pass : corrected->pass();
-  if (&pass != &as_given) {
+  if (without_errors) {
     screened.reset();
   }
+  const Pass& pass = without_errors ? without_errors->pass : corrected->pass();
   CalibrationRun run = calibrate_as_stamped(pass, asked, progress, std::move(screened));
   if (pass.settings.prior && !known_before) {
     run.by_pass_alone = by_pass_alone(pass, asked, progress);

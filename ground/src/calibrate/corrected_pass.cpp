@@ -115,24 +115,23 @@ std::optional<ClockCorrection> clocks_found(const PassSettings& settings, const 
 
 }  // namespace
 
-CorrectedPass::CorrectedPass(const Pass& as_given, const CalibrationOptions& asked, StopRequest& is_another)
-    : as_given_(as_given), options_(asked), is_another_(is_another) {
-  const bool finds_noise = asked.find_noise && asked.estimator != Estimator::kPaper;
+CorrectedPass::CorrectedPass(const Pass& as_given, const CalibrationOptions& asked, StopRequest& stop_screening)
+    : as_given_(as_given), options_(asked), stop_screening_(stop_screening) {
   make_stamps_regular();
-  if (finds_noise) {
+  if (looks_for_noise(asked)) {
     leave_out_wrong_readings();
     take_readout_noise();
   }
   correct_clocks();
   refuse_restarted_gyro(pass());
-  if (finds_noise) {
+  if (looks_for_noise(asked)) {
     leave_out_correlated_fixes();
   }
 }
 
-void CorrectedPass::use(Pass its) {
-  own_ = std::move(its);
-  is_another_.make();
+void CorrectedPass::replace_by(Pass corrected) {
+  own_ = std::move(corrected);
+  stop_screening_.make();
 }
 
 void CorrectedPass::make_stamps_regular() {
@@ -147,7 +146,7 @@ void CorrectedPass::make_stamps_regular() {
   for (Time& t : its.gyro.t) {
     t -= from_seconds(gyro_stamps_late_s_);
   }
-  use(std::move(its));
+  replace_by(std::move(its));
 }
 
 void CorrectedPass::leave_out_wrong_readings() {
@@ -159,14 +158,14 @@ void CorrectedPass::leave_out_wrong_readings() {
   bursts_ = wrong->bursts;
   bursts_->left_out = rest.has_value();
   if (rest) {
-    use(*std::move(rest));
+    replace_by(*std::move(rest));
   }
 }
 
 void CorrectedPass::take_readout_noise() {
   noise_ = other_readout_noise(pass());
   if (noise_) {
-    use(with(*noise_, pass()));
+    replace_by(with(*noise_, pass()));
   }
 }
 
@@ -179,7 +178,7 @@ void CorrectedPass::correct_clocks() {
   if (step_) {
     Pass without_step = pass();
     correct(without_step, *step_);
-    use(std::move(without_step));
+    replace_by(std::move(without_step));
     clocks_ = clocks_of(pass());
     if (!clocks_) {
       return;
@@ -190,7 +189,7 @@ void CorrectedPass::correct_clocks() {
   if (correction_.of_star_tracker() || correction_.of_gyros()) {
     Pass corrected = pass();
     correct(corrected, correction_);
-    use(std::move(corrected));
+    replace_by(std::move(corrected));
     add_clock_states(correction_, options_);
   }
 }
@@ -198,7 +197,7 @@ void CorrectedPass::correct_clocks() {
 void CorrectedPass::leave_out_correlated_fixes() {
   correlated_ = correlated_fixes(pass());
   if (std::optional<Pass> rest = without(correlated_, pass())) {
-    use(*std::move(rest));
+    replace_by(*std::move(rest));
   }
 }
 

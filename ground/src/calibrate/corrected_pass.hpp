@@ -13,12 +13,17 @@
 
 namespace trihedron::ground {
 
+/// Whether a pass is searched for its noise, and for errors of its readings and fixes.
+[[nodiscard]] inline bool looks_for_noise(const CalibrationOptions& asked) {
+  return asked.find_noise && asked.estimator != Estimator::kPaper;
+}
+
 /// A pass with stamps corrected, noise of the readings as they show it, and without readings that are wrong for a
 /// moment and fixes that repeat the errors of others.
 class CorrectedPass {
  public:
-  /// Refers to the pass, and makes the request as soon as it is not calibrated as given. Throws SetupError.
-  CorrectedPass(const Pass& as_given, const CalibrationOptions& asked, StopRequest& is_another);
+  /// Makes the request as soon as a correction is needed. Refers to the pass and to the request. Throws SetupError.
+  CorrectedPass(const Pass& as_given, const CalibrationOptions& asked, StopRequest& stop_screening);
 
   [[nodiscard]] const Pass& pass() const { return own_ ? *own_ : as_given_; }
   /// Those asked for, with states for what the corrections leave of the clock of the star tracker.
@@ -28,7 +33,7 @@ class CorrectedPass {
   void put_into(CalibrationRun& run) const;
 
  private:
-  void use(Pass its);
+  void replace_by(Pass corrected);
   void make_stamps_regular();
   void leave_out_wrong_readings();
   void take_readout_noise();
@@ -37,7 +42,7 @@ class CorrectedPass {
 
   const Pass& as_given_;
   CalibrationOptions options_;
-  StopRequest& is_another_;
+  StopRequest& stop_screening_;
   std::optional<Pass> own_;
   double gyro_stamps_off_s_ = 0;
   double gyro_stamps_late_s_ = 0;

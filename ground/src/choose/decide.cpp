@@ -96,23 +96,23 @@ Decision for_on_board(Decision decided, const Pass& pass, const Screened& screen
 }
 
 /// What there is to decide, once the estimator, the orbit and what is known before the pass have had their say.
-struct Question {
+struct OpenDecision {
   CalibrationOptions asked;
   bool change_is_open = false;
   bool by_field = false;
   /// Where nothing is left to be decided by the pass.
-  std::optional<Decision> answer;
+  std::optional<Decision> settled;
 
   /// What the pass is screened with.
-  [[nodiscard]] CalibrationOptions to_screen() const {
+  [[nodiscard]] CalibrationOptions screening_options() const {
     CalibrationOptions options = asked;
     options.find_noise = false;
     return options;
   }
 };
 
-Question question_of(const Pass& pass, const CalibrationOptions& asked_for) {
-  Question its{asked_for, false, false, {}};
+OpenDecision open_decision(const Pass& pass, const CalibrationOptions& asked_for) {
+  OpenDecision its{asked_for, false, false, {}};
   CalibrationOptions& asked = its.asked;
   if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {
     throw SetupError(fmt::format("the telemetry has {} gyros; the settings speak of {}", pass.gyro.gyros,
@@ -126,7 +126,7 @@ Question question_of(const Pass& pass, const CalibrationOptions& asked_for) {
   its.change_is_open = asked.further_states[FurtherState::kCoefficientChange] == Choice::kAuto;
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    its.answer.emplace().options = settled_before(pass.settings, asked);
+    its.settled.emplace().options = settled_before(pass.settings, asked);
     return its;
   }
   its.by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -140,54 +140,53 @@ Question question_of(const Pass& pass, const CalibrationOptions& asked_for) {
         return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
       });
   if (states_are_settled && !asked.find_noise && !asked.drift_field) {
-    its.answer.emplace().options = its.to_screen();
-    leave_out_what_is_open(its.answer->options);
+    its.settled.emplace().options = its.screening_options();
+    leave_out_what_is_open(its.settled->options);
   }
   return its;
 }
 
-Screened screened_for(const Pass& pass, const Question& question) {
-  return screen(pass, question.to_screen(), may_be_screened_with(question.asked));
+Screened screened_for(const Pass& pass, const OpenDecision& open) {
+  return screen(pass, open.screening_options(), may_be_screened_with(open.asked));
 }
 
 }  // namespace
 
 std::optional<Screened> screened_to_decide(const Pass& pass, const CalibrationOptions& asked) {
-  const Question question = question_of(pass, asked);
-  return question.answer ? std::nullopt : std::optional(screened_for(pass, question));
+  const OpenDecision open = open_decision(pass, asked);
+  return open.settled ? std::nullopt : std::optional(screened_for(pass, open));
 }
 
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Progress& progress,
-                std::optional<Screened> screened_before) {
-  Question question = question_of(pass, asked_for);
-  if (question.answer) {
-    return *std::move(question.answer);
+                std::optional<Screened> screened_ahead) {
+  OpenDecision open = open_decision(pass, asked_for);
+  if (open.settled) {
+    return *std::move(open.settled);
   }
-  const CalibrationOptions& asked = question.asked;
+  const CalibrationOptions& asked = open.asked;
   begin_stage(progress, "screens the samples");
-  Screened screened = screened_before ? *std::move(screened_before) : screened_for(pass, question);
+  Screened screened = screened_ahead ? *std::move(screened_ahead) : screened_for(pass, open);
   std::optional<OnBoardRun> run = std::exchange(screened.run, std::nullopt);
   if (screened.pass.fixes.empty()) {
     Decision decision;
     CalibrationOptions& options = decision.options;
-    options = question.to_screen();
+    options = open.screening_options();
     options.estimator = asked_for.estimator;
     options.drift_field = asked_for.drift_field;
     options.drift_model = asked_for.drift_model;
     leave_out_what_is_open(options);
     return decision;
   }
-  if (question.by_field && asked_for.estimator != Estimator::kBatch) {
-    Decision decided =
-        for_on_board(decide_with_course(pass, screened, asked, kLargestDriftModel, question.change_is_open, progress),
-                     pass, screened);
+  if (open.by_field && asked_for.estimator != Estimator::kBatch) {
+    Decision decided = for_on_board(
+        decide_with_course(pass, screened, asked, kLargestDriftModel, open.change_is_open, progress), pass, screened);
     decided.options.estimator = asked_for.estimator;
     decided.run = std::move(run);
     return decided;
   }
   DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {
-    Decision decided = decide_with_course(pass, screened, asked, largest_model, question.change_is_open, progress);
+    Decision decided = decide_with_course(pass, screened, asked, largest_model, open.change_is_open, progress);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() ||

@@ -63,9 +63,9 @@ struct Decision {
 /// field: of estimator batch as it is; estimator invariant has the model of drift_on_board() with the variances that
 /// were found. Where the coefficients are found to warm up, to jump or to change evenly, their change has that course,
 /// and its likeliest time. The noise is found where it is asked for, on a pass that is long enough and has no prior
-/// calibration. `screened`: by screened_to_decide(), where that was done before. Throws SetupError.
+/// calibration. `screened_ahead`: by screened_to_decide(), where that was done before. Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked, const Progress& progress = {},
-                              std::optional<Screened> screened = {});
+                              std::optional<Screened> screened_ahead = {});
 
 /// The pass as decide() screens it, where it does.
 [[nodiscard]] std::optional<Screened> screened_to_decide(const Pass& pass, const CalibrationOptions& asked);

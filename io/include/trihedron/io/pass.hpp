@@ -109,6 +109,9 @@ struct LoadedPass {
 /// NetCDF.
 [[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
 
+/// All files that the pass was read from by this path: nothing may be written there (expect_apart()).
+[[nodiscard]] std::vector<std::filesystem::path> inputs_of(const std::filesystem::path& path, const LoadedPass& loaded);
+
 /// Gives columns of a Parquet or NetCDF file as the text of a CSV file: their names in the first line, commas, an empty
 /// field or nan where there is no value, timestamps as ISO dates and times. Where it lacks one, the names that it has,
 /// without rows.

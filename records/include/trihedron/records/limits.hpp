@@ -130,6 +130,7 @@ inline constexpr Range kInterpolationDegree{1, 25, "", "polynomials of higher de
 // ---- Options
 
 inline constexpr Range kAttitudeLimit_rad{1e-9, 3.15, "rad", "an error has no sign, and is at most a half turn"};
+inline constexpr Range kGap_s{1e-6, kYear_s, "s", "it is a time between epochs beyond which a new segment begins"};
 inline constexpr Range kSlewRate_rad_s{1e-6, 1, "rad/s", "a spacecraft turns by some tenths of a degree a second"};
 inline constexpr Range kSlewAngle_rad{1e-4, 3.15, "rad", "a slew has some degrees, and at most a half turn"};
 inline constexpr Range kSlews{1, 100, "", "it is a number of slews"};

@@ -16,7 +16,7 @@ class Stopped : public std::exception {
 class StopRequest {
  public:
   StopRequest() = default;
-  /// Made as well where `also` is, if any, to which it refers: of a part of the work that may turn out to be in vain.
+  /// For a part of the work. It counts as made when `also` is, which may be null and must outlive it.
   explicit StopRequest(const StopRequest* also) noexcept : also_(also) {}
 
   void make() noexcept { made_.store(true, std::memory_order_relaxed); }
