@@ -428,11 +428,13 @@ def test_evaluation_without_truth_is_against_the_star_tracker(csv_pass, tmp_path
 
 
 def test_evaluation_takes_its_truth_from_standard_input_and_one_file_alone(csv_pass, tmp_path):
-    run("navigate", csv_pass, "--prior", "-o", tmp_path / "a.csv")
-    truth = (tmp_path / "a.csv").read_text()
-    evaluated = run("--json", "evaluate", csv_pass, "--attitude", tmp_path / "a.csv", "--truth", "-", input=truth)
-    assert evaluated.returncode == TRUSTWORTHY, evaluated.stderr
-    refused(run("evaluate", csv_pass, "--attitude", "-", "--before", "-"), WRONG_USAGE, "standard input")
+    directory = csv_pass()
+    run("navigate", directory, "--online", "-o", tmp_path / "a.csv")
+    evaluation = ("--json", "evaluate", directory, "--attitude", tmp_path / "a.csv", "--truth")
+    by_file = run(*evaluation, tmp_path / "a.csv")
+    assert by_file.returncode == TRUSTWORTHY, by_file.stderr
+    assert run(*evaluation, "-", input=(tmp_path / "a.csv").read_text()).stdout == by_file.stdout
+    refused(run("evaluate", directory, "--attitude", "-", "--before", "-"), WRONG_USAGE, "standard input")
 
 
 def test_installed_help_names_every_command():
