@@ -85,7 +85,6 @@ ground::CalibrationEvaluation stage_outcome(io::StagedDirectory& staged, const s
         io::write_file(out / kReportFile, report::render(input));
       },
       [&] {
-        io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(run));
         io::write_calibration(out / kCalibrationFile, run.calibration);
         const io::Mounting& mounting = pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
         io::write_attitude(out / kAttitudeFile, epoch, run.attitude, mounting);
@@ -95,6 +94,9 @@ ground::CalibrationEvaluation stage_outcome(io::StagedDirectory& staged, const s
           staged.drop(below / kDefinitiveFile);
         }
         io::write_file(out / kConfigFile, io::format_config(options));
+        // Last: the library keeps what it takes.
+        give_back_memory();
+        io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(run));
       });
   return evaluation;
 }

@@ -131,7 +131,8 @@ enum trihedron_fix {
   TRIHEDRON_FIX_USED = 3,
   /** Used after a run of rejections, with the directions reopened. */
   TRIHEDRON_FIX_USED_AFTER_REOPENING = 4,
-  /** Used after another run of rejections soon after: the filter restarted. */
+  /** Used after another run of rejections soon after, or where it contradicts the first fix alone: the filter
+   *  restarted. */
   TRIHEDRON_FIX_RESTARTED = 5,
   /** The quaternion is not finite or not of unit length. */
   TRIHEDRON_FIX_REJECTED_NOT_ROTATION = 6,

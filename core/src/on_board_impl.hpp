@@ -559,9 +559,11 @@ auto OnBoard<Estimator>::after_calibration() -> typename Work::Stage {
   if (!policy_.navigate) {
     return Work::Stage::kNavigated;
   }
-  // All later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
-  const bool start_was_wrong = start_unconfirmed_ && work_.outcome.fix.status == FixStatus::kUsedAfterReopening;
-  start_unconfirmed_ = work_.outcome.fix.status == FixStatus::kStarted;
+  // Later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
+  const bool has_restarted = work_.outcome.fix.status == FixStatus::kRestarted;
+  const bool start_was_wrong =
+      start_unconfirmed_ && (has_restarted || work_.outcome.fix.status == FixStatus::kUsedAfterReopening);
+  start_unconfirmed_ = work_.outcome.fix.status == FixStatus::kStarted || (start_unconfirmed_ && has_restarted);
   // The navigator rests on what the filter knew before it was contradicted.
   const bool was_contradicted =
       work_.outcome.fix.status == FixStatus::kUsedAfterWidening && parameters_ == ParametersInUse::kOfCalibration;

@@ -25,6 +25,11 @@ FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double m
   since_fix_s_ = 0;
   FixStatus status = FixStatus::kUsed;
   if (!(nis <= gate_of_freedom(freedom, setup.gate_nis))) {
+    if (restarts_at_once_left_ > 0) {
+      --restarts_at_once_left_;
+      misfit_rad_ = 0;
+      return FixStatus::kRestarted;
+    }
     look_for_jump(jumped_now, before_rad, largest_rad, setup.reopen_after_rejections);
     jumped_ = jumped_ && !is_of_gyros;
     if (++rejections_in_a_row_ < (jumped_ ? setup.reopen_after_jump_rejections : setup.reopen_after_rejections)) {
@@ -38,6 +43,7 @@ FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double m
     under_suspicion_ = std::max(under_suspicion_ - 1, 0);
   }
   confirmed_ = status == FixStatus::kUsed;
+  restarts_at_once_left_ = 0;
   jumped_ = false;
   rejections_in_a_row_ = 0;
   return status;

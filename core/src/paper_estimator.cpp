@@ -155,9 +155,9 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
   report.head = fix.head;
   const Eigen::Matrix3d C_in_c = fix.q_in_c.normalized().toRotationMatrix();
   if (!started_) {
-    for (int k = 0; k < kGyros; ++k) {
-      gyros_[k].h_in = C_in_c * (gyros_[k].C_c_b * readings.h_b[k]);
-    }
+    started_ = start(C_in_c, readings.h_b, fix.covariance);
+    report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
+    return report;
   }
   const auto trihedron = make_trihedron(Vec<In>::assume(gyros_[0].h_in), Vec<In>::assume(gyros_[1].h_in));
   if (!trihedron) {
@@ -165,17 +165,8 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
     return report;
   }
   const QuasiInertial now = quasi_inertial(trihedron.value());
-  if (started_) {
-    update_covariance_to_now(now);
-  } else {
-    qi_ = now;
-  }
+  update_covariance_to_now(now);
   const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_, fix.covariance);
-  if (!started_) {
-    start(measurement);
-    report.status = FixStatus::kStarted;
-    return report;
-  }
   ComponentCovariance L;
   ComparedRows<kMaxStates> rows = seen(measurement, L);
   report_innovation(measurement, rows, L, report);
@@ -192,8 +183,8 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
       break;
     case FixStatus::kRestarted:
       // The information was gathered about estimates that are far off: linearise again about the present ones.
-      errors_ = prior_;
-      start(measurement);
+      report.status =
+          start(C_in_c, readings.h_b, fix.covariance) ? FixStatus::kRestarted : FixStatus::kRejectedGeometry;
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
@@ -221,14 +212,22 @@ ComparedRows<PaperEstimator::kMaxStates> PaperEstimator::seen(const Measurement&
   return rows;
 }
 
-void PaperEstimator::start(const Measurement& measurement) {
+bool PaperEstimator::start(const Eigen::Matrix3d& C_in_c, const Directions& h_b, const FixCovariance& covariance) {
+  const Eigen::Vector3d read_in[] = {C_in_c * (gyros_[0].C_c_b * h_b[0]), C_in_c * (gyros_[1].C_c_b * h_b[1])};
+  const auto trihedron = make_trihedron(Vec<In>::assume(read_in[0]), Vec<In>::assume(read_in[1]));
+  if (!trihedron) {
+    return false;
+  }
+  for (int k = 0; k < kGyros; ++k) {
+    gyros_[k].h_in = read_in[k].normalized();
+  }
+  qi_ = quasi_inertial(trihedron.value());
+  const Measurement measurement = measure(gyros_, qi_, C_in_c, h_b, setup_, covariance);
   Errors::DynamicByStates F = -measurement.H;
   F.leftCols<States::kDynamic>().setZero();
+  errors_ = prior_;
   errors_.begin(rows_of(F), measurement.R);
-  Errors::Vector correction = Errors::Vector::Zero(kMaxStates);
-  correction.head<States::kDynamic>() = measurement.innovation;
-  feed_back(correction);
-  started_ = true;
+  return true;
 }
 
 void PaperEstimator::feed_back(const Errors::Vector& correction) {

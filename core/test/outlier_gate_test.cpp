@@ -80,6 +80,7 @@ TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
     EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
     return gate.judge(100, kSmall_rad);
   };
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(run(), FixStatus::kUsedAfterReopening);
   EXPECT_EQ(run(), FixStatus::kRestarted);
   // Ten good fixes later the suspicion is over.
@@ -89,6 +90,21 @@ TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
     }
     EXPECT_EQ(run(), good < 10 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening);
   }
+}
+
+TEST(OutlierGate, RestartsAtOnceWhereTheNextFixContradictsAStart) {
+  Gate gate(3, 50);
+  for (int i = 0; i < OutlierGate::kMostRestartsAtOnce; ++i) {
+    EXPECT_EQ(gate.judge(100, kLie_rad), FixStatus::kRestarted);
+    EXPECT_FALSE(gate.restarted_recently());
+  }
+  // A start that no fix ever confirms is judged as any other; a jump from it is none.
+  EXPECT_EQ(rejections(gate, kLie_rad), 2);
+
+  Gate confirmed(3, 50);
+  EXPECT_EQ(confirmed.judge(100, kLie_rad), FixStatus::kRestarted);
+  EXPECT_EQ(confirmed.judge(4, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(confirmed.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
 }
 
 TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
@@ -136,6 +152,7 @@ TEST(OutlierGate, WaitsLongerWhereTheMisfitComesBackNowAndThen) {
 
 TEST(OutlierGate, IsAsWideForEachNumberOfComponents) {
   Gate gate(5, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(33, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_EQ(gate.judge(33, kSmall_rad, 6), FixStatus::kUsed);
 }
@@ -155,11 +172,6 @@ TEST(OutlierGate, DoesNotTakeWhatDriftMayDoInTheTimeForAJump) {
     ++count;
   }
   EXPECT_EQ(count, 9);
-}
-
-TEST(OutlierGate, BelievesAllOthersAgainstAStartThatNoneConfirms) {
-  Gate gate(3, 50);
-  EXPECT_EQ(rejections(gate, kLie_rad), 2);
 }
 
 }  // namespace

@@ -144,7 +144,22 @@ void Recorder::add(const StepReport& report, const Pipeline& pipeline) {
   }
 }
 
+/// What rests on a first fix alone that the next one contradicts: it may have been wrong.
+void Recorder::forget_unconfirmed_start() {
+  const auto is_confirmed = [](const FixRecord& fix) {
+    return fix.used() && fix.status != FixStatus::kStarted && fix.status != FixStatus::kRestarted;
+  };
+  if (std::ranges::none_of(run_.fixes, is_confirmed)) {
+    run_.attitude = {};
+    run_.parameters = {};
+    run_.corrections.clear();
+  }
+}
+
 void Recorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
+  if (report.fix.status == FixStatus::kRestarted) {
+    forget_unconfirmed_start();
+  }
   FixRecord& fix = run_.fixes.emplace_back(record_of(report, pipeline.layout().gyros));
   if (report.navigated && report.compared) {
     fix.off_navigator_rad = pipeline.apart_rad(*report.navigated, *report.compared);

@@ -66,6 +66,19 @@ TEST(Calibrate, KnowsHowFarTheAttitudeOfABodyThatShakesIsOff) {
   EXPECT_GT(run.attitude.sigma_rad.back().minCoeff(), 1 * kArcsecond);
 }
 
+TEST(Calibrate, HasNoAttitudeByAFirstFixThatTheNextContradicts) {
+  sim::SimulatedPass simulated = two_hours();
+  std::vector<Eigen::Quaterniond>& q_in_c = simulated.pass.star_tracker.q_in_c;
+  q_in_c[0] = q_in_c[0] * Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX()));
+  const CalibrationRun run = calibrate(simulated.pass, told());
+  EXPECT_EQ(run.fixes[1].status, FixStatus::kRestarted);
+  EXPECT_EQ(run.attitude.t.front(), simulated.pass.star_tracker.t[1]);
+  const AttitudeErrors errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
+  for (std::size_t i = 0; i < errors.t.size(); ++i) {
+    EXPECT_LT(errors.error_rad[i].cwiseQuotient(errors.sigma_rad[i]).cwiseAbs().maxCoeff(), 6) << i;
+  }
+}
+
 TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   std::vector<double> progress;
   const auto run =

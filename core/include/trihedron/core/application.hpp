@@ -36,7 +36,7 @@ class Application {
  public:
   using Gyros = typename Estimator::Gyros;
   /// For SnapshotStore. To be counted up whenever a member of the state is added, removed or gets another meaning.
-  static constexpr std::uint32_t kStateVersion = 14;
+  static constexpr std::uint32_t kStateVersion = 15;
   static constexpr std::uint32_t kSnapshotLayout =
       kStateVersion << 16 | static_cast<std::uint32_t>(Estimator::kMaxStates) << 4 | sizeof(void*);
 

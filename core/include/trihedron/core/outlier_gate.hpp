@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/status.hpp"
 
@@ -16,7 +18,8 @@ inline constexpr int kPairComponents = 4;
 /// to be wrong, not the tracker, and the directions are reopened (their covariance is widened); when that happens again
 /// soon, the filter restarts. Where the misfit has jumped by more than a momentum can drift, the star tracker is taken
 /// to be wrong, and the run may be much longer; but not where the angle between the momenta, to which no star tracker
-/// adds anything, has a part in the misfit.
+/// adds anything, has a part in the misfit. Where the next fix contradicts the first, on which alone the filter rests,
+/// either may be wrong: the filter restarts from the later one at once, a few times.
 class OutlierGate {
  public:
   /// Largest change of the misfit from one fix to the next that a wrong model can cause: at once, by an alignment wrong
@@ -24,6 +27,9 @@ class OutlierGate {
   /// by half a degree in a body that turns at orbital rate.
   static constexpr double kLargestStep_rad = 8.7e-3;  // 30′
   static constexpr double kLargestRate_rad_s = 1e-5;
+
+  /// Restarts without a run of rejections, until a fix confirms the start.
+  static constexpr int kMostRestartsAtOnce = 3;
 
   /// Adds to the time since the last fix.
   void elapse(double dt_s) { since_fix_s_ += dt_s; }
@@ -50,6 +56,7 @@ class OutlierGate {
   bool restarted_ = false;  ///< when suspicion arose last
   bool confirmed_ = false;  ///< what the filter rests on has agreed with a fix after it
   bool jumped_ = false;
+  std::int8_t restarts_at_once_left_ = kMostRestartsAtOnce;  ///< 0 once the start is confirmed
   double before_jump_rad_ = 0;
   int back_ = 0;  ///< fixes in a row since the jump
 };

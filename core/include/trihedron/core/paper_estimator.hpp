@@ -142,7 +142,9 @@ class PaperEstimator {
   /// correct() before sound() is asked.
   [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
   /// The momenta are those of the fix, all else is as before it.
-  void start(const Measurement& measurement);
+  /// The momenta as the readings show them at a fix, with the covariance of the prior. False, and nothing is done,
+  /// where they are nearly parallel.
+  [[nodiscard]] bool start(const Eigen::Matrix3d& C_in_c, const Directions& h_b, const FixCovariance& covariance);
   void update_covariance_to_now(const QuasiInertial& now);
   /// The measurement whitened, by the root L of its noise, and seen through the uncertainty, with what it shows.
   [[nodiscard]] ComparedRows<kMaxStates> seen(const Measurement& measurement, ComponentCovariance& L) const;

@@ -33,7 +33,8 @@ enum class FixStatus : std::uint8_t {
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
   kUsedAfterReopening,   ///< used after a run of rejections, with the directions reopened
-  kRestarted,            ///< used after another run of rejections soon after: the filter restarted
+  kRestarted,            ///< used after another run of rejections soon after, or where it contradicts the first
+                         ///< fix alone: the filter restarted
   kRejectedNotRotation,  ///< quaternion not finite or not unit
   kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
   kRejectedNoGyro,       ///< no gyro samples close enough round it

@@ -63,6 +63,7 @@ class Recorder {
 
  private:
   void add_sample(const StepReport& report, const Pipeline& pipeline);
+  void forget_unconfirmed_start();
   void add_fix(const StepReport& report, const Pipeline& pipeline);
   void add_angle(Time t, double residual);
 
