@@ -36,7 +36,7 @@ void keep_extremes(std::span<const std::vector<double>> channels, std::size_t be
       keep.push_back(greatest);
     }
   }
-  std::sort(keep.begin() + static_cast<std::ptrdiff_t>(before), keep.end());
+  std::ranges::sort(keep.begin() + static_cast<std::ptrdiff_t>(before), keep.end());
 }
 
 }  // namespace
@@ -58,7 +58,8 @@ std::vector<std::size_t> decimate(std::span<const double> t, std::span<const std
     begin = end;
   }
   keep.push_back(t.size() - 1);
-  keep.erase(std::unique(keep.begin(), keep.end()), keep.end());
+  const auto repeated = std::ranges::unique(keep);
+  keep.erase(repeated.begin(), repeated.end());
   return keep;
 }
 
