@@ -7,25 +7,19 @@
 #include <chrono>
 
 #include "passes.hpp"
-#include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::ground {
 namespace {
 
-const Pass& clean_pass() {
-  static const Pass its = sim::simulate(scenario_in_eq1(3, std::chrono::hours(2))).pass;
-  return its;
-}
-
 TEST(CorrectedPass, IsThePassItselfWhereNothingIsWrong) {
   StopRequest stop_screening;
-  const CorrectedPass corrected(clean_pass(), {}, stop_screening);
-  EXPECT_EQ(&corrected.pass(), &clean_pass());
+  const CorrectedPass corrected(two_hours().pass, {}, stop_screening);
+  EXPECT_EQ(&corrected.pass(), &two_hours().pass);
   EXPECT_FALSE(stop_screening.made());
 }
 
 TEST(CorrectedPass, StopsTheScreeningOfThePassAsGiven) {
-  Pass late = clean_pass();
+  Pass late = two_hours().pass;
   for (Time& t : late.star_tracker.t) {
     t += std::chrono::milliseconds(400);
   }
